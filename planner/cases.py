@@ -1,0 +1,69 @@
+"""Named requests, shared by tests, benchmarks, the service's presets and the docs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+#: Public joint limits of a UR5e: velocity in rad/s, acceleration in rad/s², jerk in rad/s³, the same for all joints.
+UR5E = {"velocity": 3.14, "acceleration": 10.0, "jerk": 100.0}
+
+PICK_AND_PLACE = [
+    [0.0, -1.57, 1.57, -1.57, -1.57, 0.0],
+    [0.55, -1.25, 1.72, -2.04, -1.57, 0.55],
+    [0.72, -1.02, 1.85, -2.40, -1.57, 0.72],
+    [0.72, -1.22, 1.60, -1.95, -1.57, 0.72],
+    [-0.10, -1.45, 1.30, -1.42, -1.57, 0.20],
+    [-0.95, -1.22, 1.60, -1.95, -1.57, -0.40],
+    [-0.95, -0.98, 1.88, -2.47, -1.57, -0.95],
+    [0.0, -1.57, 1.57, -1.57, -1.57, 0.0],
+]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A request in the HTTP contract's shape, under a name."""
+
+    name: str
+    title: str
+    request: Mapping[str, Any]
+
+
+CASES: dict[str, Case] = {
+    c.name: c
+    for c in (
+        Case(
+            "contract_example",
+            "Two joints, three waypoints at given times, limits that do not bind",
+            {
+                "waypoints": [[0, 0], [1, 2], [2, 3]],
+                "times": [0, 1, 2],
+                "limits": {"velocity": 3.5, "acceleration": [8, None], "jerk": 60},
+                "sampling": {"dt": 0.01},
+                "include": ["samples", "polynomial"],
+            },
+        ),
+        Case(
+            "two_joint_times",
+            "Two joints, three waypoints at given times, no limits",
+            {"waypoints": [[0, 0], [1, 2], [2, 3]], "times": [0, 1, 2]},
+        ),
+        Case(
+            "ur5e_times",
+            "UR5e pick and place at given times, no limits",
+            {"waypoints": PICK_AND_PLACE, "times": [0.0, 0.6, 1.1, 1.5, 2.3, 3.1, 3.6, 4.6]},
+        ),
+        Case(
+            "ur5e_acceleration",
+            "UR5e pick and place under velocity and acceleration limits",
+            {
+                "waypoints": PICK_AND_PLACE,
+                "limits": {"velocity": UR5E["velocity"], "acceleration": UR5E["acceleration"]},
+            },
+        ),
+        Case(
+            "ur5e_jerk",
+            "UR5e pick and place under velocity, acceleration and jerk limits",
+            {"waypoints": PICK_AND_PLACE, "limits": UR5E},
+        ),
+    )
+}

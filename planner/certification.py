@@ -1,0 +1,261 @@
+"""Certify anyone's trajectory: a piecewise polynomial exactly, samples by divided differences."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InvalidRequest
+from .limits import QUANTITIES, Boundary, Limits
+from .reading import increasing, matrix, vector
+from .trajectory import Trajectory
+from .types import Certificate, Check, Demands
+from .verify import TOLERANCE, position_span, verify
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A trajectory known by samples only: times (M,), positions (M, D), and derivatives where they were sent."""
+
+    time: Array
+    position: Array
+    velocity: Array | None = None
+    acceleration: Array | None = None
+
+    @classmethod
+    def of(cls, time: Any, position: Any, velocity: Any = None, acceleration: Any = None) -> "Recorded":
+        """Read and check samples; the fields' pointers start with ``/trajectory/samples``."""
+        where = "/trajectory/samples"
+        times = increasing(vector(time, f"{where}/time", largest=1e11), f"{where}/time")
+        if len(times) < 2:
+            raise InvalidRequest.of(f"{where}/time", "too_few_points", "needs at least two samples")
+        points = matrix(position, f"{where}/position")
+        read: dict[str, Array] = {}
+        for name, value in (("velocity", velocity), ("acceleration", acceleration)):
+            if value is not None:
+                read[name] = matrix(value, f"{where}/{name}", points.shape[1])
+        for name, rows in (("position", points), *read.items()):
+            if len(rows) != len(times):
+                reason = f"needs {len(times)} rows, has {len(rows)}"
+                raise InvalidRequest.of(f"{where}/{name}", "shape_mismatch", reason)
+        return cls(times, points, **read)
+
+
+def certify(
+    trajectory: Trajectory | Recorded,
+    *,
+    limits: Any = None,
+    waypoints: Any = None,
+    times: Any = None,
+    start: Any = None,
+    end: Any = None,
+) -> Certificate:
+    """Return what a trajectory keeps of limits, waypoints and end states, also where it does not hold.
+
+    Waypoints without times are to be passed in this order at any times. Samples are judged by divided differences:
+    every smooth curve through them takes, somewhere between the samples, the values reported.
+
+    Parameters
+    ----------
+    limits, start, end
+        As in a plan request.
+    waypoints : (N, D)
+    times : (N,)
+
+    Raises
+    ------
+    InvalidRequest
+    """
+    position = trajectory.position if isinstance(trajectory, Recorded) else trajectory.coefficients[-1]
+    dims = int(position.shape[1])
+    points = None if waypoints is None else matrix(waypoints, "/waypoints", dims)
+    if times is not None and points is None:
+        raise InvalidRequest.of("/times", "conflict", "times belong to waypoints: send those too")
+    at = None
+    if points is not None and times is not None:
+        at = increasing(vector(times, "/times", len(points), 1e11), "/times")
+    demands = Demands(
+        dims=dims,
+        limits=Limits() if limits is None else Limits.of(limits, dims),
+        waypoints=points,
+        times=at,
+        start=Boundary() if start is None else Boundary.of(start, dims, "/start"),
+        end=Boundary() if end is None else Boundary.of(end, dims, "/end"),
+    )
+    if isinstance(trajectory, Recorded):
+        return _certify_samples(trajectory, demands)
+    passing = _passing_times(trajectory, points) if points is not None and at is None else None
+    return _bounded_norm(verify(trajectory, demands, passing), demands)
+
+
+def _bounded_norm(certificate: Certificate, demands: Demands) -> Certificate:
+    """Refuse to call kept what was not looked at."""
+    unseen = [n for n in demands.limits.given() if n not in QUANTITIES]
+    if unseen:
+        raise InvalidRequest.of(f"/limits/{unseen[0]}", "unknown_field", "this limit cannot be certified yet")
+    return certificate
+
+
+def _passing_times(trajectory: Trajectory, points: Array) -> Array:
+    """Return when the waypoints are passed, in order: the earliest times of least distance that keep the order."""
+    degree = max(trajectory.degree, 1)
+    u = np.linspace(0.0, 1.0, 8 * degree + 1)[:-1]
+    grid = (trajectory.breaks[:-1, None] + np.diff(trajectory.breaks)[:, None] * u).reshape(-1)
+    grid = np.unique(np.append(grid, trajectory.end))
+    values = trajectory(grid)
+    tolerance = TOLERANCE * position_span(points)
+    times, first = np.zeros(len(points)), 0
+    for i, point in enumerate(points):
+        distance = np.linalg.norm(values[first:] - point, axis=1)
+        dips = np.flatnonzero(_is_dip(distance))
+        best_time, best = grid[first], np.inf
+        for k in dips[np.argsort(dips)]:
+            left, right = grid[first + max(k - 1, 0)], grid[min(first + k + 1, len(grid) - 1)]
+            time, miss = _closest(trajectory, point, left, right)
+            if times[i - 1] <= time + 1e-12 and miss < best - 0.1 * tolerance:
+                best_time, best = time, miss
+            if best <= tolerance:
+                break
+        times[i] = max(best_time, times[i - 1] if i else trajectory.start)
+        first = max(int(np.searchsorted(grid, times[i], side="right")) - 1, 0)
+    return times
+
+
+def _is_dip(distance: Array) -> NDArray[np.bool_]:
+    padded = np.concatenate([[np.inf], distance, [np.inf]])
+    return np.asarray((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
+
+
+def _closest(trajectory: Trajectory, point: Array, left: float, right: float) -> tuple[float, float]:
+    """Return the time of least distance in [left, right] by golden sections, and the distance."""
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    for _ in range(90):
+        a, b = right - ratio * (right - left), left + ratio * (right - left)
+        da, db = (float(np.linalg.norm(trajectory(t) - point)) for t in (a, b))
+        left, right = (left, b) if da <= db else (a, right)
+    ends = [(float(np.linalg.norm(trajectory(t) - point)), float(t)) for t in (left, 0.5 * (left + right), right)]
+    miss, time = min(ends)
+    return time, miss
+
+
+def _certify_samples(recorded: Recorded, demands: Demands) -> Certificate:
+    polyline = Trajectory.from_hermite(recorded.time, recorded.position)
+    passing = None
+    if demands.waypoints is not None and demands.times is None:
+        passing = _passing_times(polyline, demands.waypoints)
+    whole = verify(polyline, replace(demands, limits=Limits(), start=Boundary(), end=Boundary()), passing)
+    differences = _divided_differences(recorded)
+    checks = [row for order in range(4) if (row := _difference_row(differences, demands, order)) is not None]
+    checks += _sent_rows(recorded, differences)
+    boundary_error = _sampled_boundary(recorded, demands, differences)
+    errors = (whole.waypoint_error, boundary_error)
+    squared = None
+    if len(differences) > 3:
+        at, jerk = differences[3]
+        squared = float(np.sum(np.diff(_edges(at, recorded.time))[:, None] * jerk**2))
+    return Certificate(
+        holds=all(c.holds for c in checks) and all(e is None or e <= TOLERANCE for e in errors),
+        basis="finite_differences",
+        checks=tuple(checks),
+        waypoint_error=whole.waypoint_error,
+        boundary_error=boundary_error,
+        continuity=None,
+        path_deviation=None,
+        cost={"squared_jerk": squared, "path_length": whole.cost["path_length"]},
+        peaks={QUANTITIES[m]: tuple(float(v) for v in np.abs(d).max(axis=0)) for m, (_, d) in enumerate(differences)},
+    )
+
+
+def _divided_differences(recorded: Recorded) -> list[tuple[Array, Array]]:
+    """Return (times, values) of the derivatives 0 … 3: m! times the divided difference over m + 1 samples.
+
+    By the mean value theorem each is a value of the m-th derivative between those samples.
+    """
+    t, rows = recorded.time, [(recorded.time, recorded.position)]
+    table = recorded.position
+    for order in range(1, min(4, len(t))):
+        table = order * np.diff(table, axis=0) / (t[order:] - t[:-order])[:, None]
+        centres = np.stack([t[k : len(t) - order + k] for k in range(order + 1)]).mean(axis=0)
+        rows.append((centres, table))
+    return rows
+
+
+def _edges(at: Array, times: Array) -> Array:
+    return np.concatenate([times[:1], 0.5 * (at[:-1] + at[1:]), times[-1:]])
+
+
+def _difference_row(differences: list[tuple[Array, Array]], demands: Demands, order: int) -> Check | None:
+    limit = getattr(demands.limits, QUANTITIES[order])
+    if limit is None:
+        return None
+    if order >= len(differences):
+        return Check(QUANTITIES[order], None, None, None, None, None, None, False)
+    at, values = differences[order]
+    scale = limit.scale()
+    excess = np.stack([(values - limit.upper) / scale, (limit.lower - values) / scale])
+    side, row, joint = (int(i) for i in np.unravel_index(int(np.argmax(excess)), excess.shape))
+    value, bound = float(values[row, joint]), float((limit.upper, limit.lower)[side][joint])
+    ratio: float | None = value / bound if order else None
+    if order == 0:
+        half = 0.5 * (limit.upper[joint] - limit.lower[joint])
+        middle = 0.5 * (limit.upper[joint] + limit.lower[joint])
+        ratio = float(abs(value - middle) / half) if np.isfinite(half) else None
+    segment = None
+    if demands.times is not None:
+        segment = int(np.clip(np.searchsorted(demands.times, at[row], side="right") - 1, 0, len(demands.times) - 2))
+    holds = bool(excess.max() <= TOLERANCE)
+    return Check(QUANTITIES[order], joint, segment, float(at[row]), value, bound, ratio, holds)
+
+
+def _sent_rows(recorded: Recorded, differences: list[tuple[Array, Array]]) -> list[Check]:
+    """Return whether sent derivatives agree with the positions: the mean of neighbours against the difference.
+
+    The trapezoidal rule is off by h² / 12 times the second derivative of what is averaged; four times that estimate,
+    plus 1e-6 of the peak, is allowed.
+    """
+    rows = []
+    h = np.diff(recorded.time)[:, None]
+    sent_by_order = ((1, recorded.velocity), (2, recorded.acceleration))
+    below: Array | None = recorded.position
+    for order, sent in sent_by_order:
+        if sent is not None and below is not None:
+            slope = np.diff(below, axis=0) / h
+            off = np.abs(0.5 * (sent[:-1] + sent[1:]) - slope)
+            bend = (
+                np.abs(np.diff(sent, 2, axis=0)).max(axis=0, initial=0.0) if len(sent) > 2 else np.zeros(off.shape[1])
+            )
+            allowed = bend / 3.0 + TOLERANCE * np.maximum(np.abs(sent).max(axis=0), 1e-12)
+            ratio = off / allowed
+            row, joint = (int(i) for i in np.unravel_index(int(np.argmax(ratio)), ratio.shape))
+            name = f"sent_{QUANTITIES[order]}"
+            time, worst = float(recorded.time[row]), float(ratio[row, joint])
+            value, bound = float(off[row, joint]), float(allowed[joint])
+            rows.append(Check(name, joint, None, time, value, bound, worst, worst <= 1.0))
+        below = sent
+    return rows
+
+
+def _sampled_boundary(recorded: Recorded, demands: Demands, differences: list[tuple[Array, Array]]) -> float | None:
+    """Return the error of the end states: of sent derivatives where there are some, else of the end differences."""
+    worst = None
+    ends: tuple[tuple[Boundary, int], ...] = ((demands.start, 0), (demands.end, -1))
+    for boundary, index in ends:
+        for order, name in enumerate(QUANTITIES):
+            asked = getattr(boundary, name, None)
+            if asked is None:
+                continue
+            sent: Mapping[str, Array | None] = {"velocity": recorded.velocity, "acceleration": recorded.acceleration}
+            values = sent.get(name)
+            if values is None:
+                if order >= len(differences):
+                    return float("inf")
+                values = differences[order][1]
+            limit = demands.limits.bounds(order, demands.dims).scale()
+            relative = np.maximum(np.maximum(1.0, limit), np.abs(values).max(axis=0))
+            error = float((np.abs(values[index] - asked) / relative).max())
+            worst = error if worst is None else max(worst, error)
+    return worst

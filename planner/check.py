@@ -1,0 +1,221 @@
+"""The first stretch of the road: is the request complete, does the method honour it, what exactly is it held to."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .curves.knots import centripetal
+from .errors import Infeasible, InvalidRequest, Unsupported
+from .limits import QUANTITIES, Boundary, magnitude, segment_bounds
+from .method import Capabilities, Method
+from .options import Options
+from .types import Demands, Note, PlanRequest
+
+Array = NDArray[np.float64]
+
+#: Waypoints closer than this, relative to their range, cannot be told apart.
+SAME = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A checked request, as the method gets it, and what its answer is held to.
+
+    ``kept[i]`` is the index, among the request's waypoints, of the caller's waypoint i (merged ones share it);
+    ``still``: nothing moves, so that every method's answer is the hold.
+    """
+
+    request: PlanRequest
+    demands: Demands
+    kept: NDArray[np.int64]
+    still: bool
+    notes: tuple[Note, ...]
+
+
+def check(request: PlanRequest, method: Method, options: Options, methods: Iterable[Method]) -> Asked:
+    """Check a request against what a method requires and honours.
+
+    Raises
+    ------
+    Unsupported
+        Something is asked that the method does not honour.
+    InvalidRequest
+        Something the method requires is missing, or what is given contradicts itself.
+    Infeasible
+        A waypoint, an end state or a mean speed breaks a limit, so that nothing can help.
+    """
+    can, original = method.capabilities(options), request
+    _refuse_unsupported(request, method, can, methods)
+    _require(request, can)
+    notes = []
+    if request.times is None and can.timing != "parameter" and not options.fixes_knots:
+        request, kept = _merged(request)
+        if len(request.waypoints) < len(kept):
+            count = len(kept) - len(request.waypoints)
+            notes.append(Note("waypoints_merged", f"{count} waypoint(s) equal to the one before were merged with it"))
+    else:
+        kept = np.arange(request.count)
+    start, end = (_resolved(request, can, side) for side in ("start", "end"))
+    still = not np.ptp(request.waypoints, axis=0).any() and not _moving(start) and not _moving(end)
+    if request.times is None and can.timing == "given":
+        assert request.duration is not None  # _require saw to it
+        if not still:
+            knots = centripetal(request.waypoints)
+            request = replace(request, times=(knots - knots[0]) / (knots[-1] - knots[0]) * request.duration.min)
+            notes.append(Note("times_chosen", "no times were given: spread centripetally over the duration"))
+    request = replace(request, start=start, end=end)
+    _refuse_hopeless(request, can.timing == "given")
+    demands = Demands(
+        dims=request.dims,
+        limits=request.limits,
+        waypoints=None if can.timing == "parameter" else original.waypoints,
+        times=request.times[kept] if can.timing == "given" and request.times is not None else None,
+        segment_limits=original.segment_limits,
+        segment_durations=original.segment_durations,
+        duration=request.duration,
+        start=start,
+        end=end,
+    )
+    return Asked(request, demands, kept, still, tuple(notes))
+
+
+def asked_words(request: PlanRequest) -> set[str]:
+    """Return the capability words that a request needs a method to honour."""
+    words = set(request.limits.given())
+    for each in request.segment_limits or ():
+        words |= set() if each is None else {"segment_limits", *each.given()}
+    for side in (request.start, request.end):
+        words |= {f"boundary_{name}" for name in side.given()}
+    plain = ("times", "segment_durations", "duration", "waypoint_states", "waypoint_tolerance", "tube", "robot")
+    return words | {name for name in plain if getattr(request, name) is not None}
+
+
+def _refuse_unsupported(request: PlanRequest, method: Method, can: Capabilities, methods: Iterable[Method]) -> None:
+    words = asked_words(request)
+    refused = words - set(can.words)
+    for side in ("start", "end"):
+        taken: frozenset[str] = getattr(can, side)
+        if request.limits.jerk is None:
+            taken -= can.with_jerk
+        refused |= {f"boundary_{name}" for name in getattr(request, side).given() if name not in taken}
+    if not refused:
+        return
+    what = ", ".join(sorted(refused))
+    others = [m for m in methods if m.id != method.id]
+    full = [m.id for m in others if m.honours(words)]
+    raise Unsupported(method.id, what, full or [m.id for m in others if m.honours(refused)])
+
+
+def _require(request: PlanRequest, can: Capabilities) -> None:
+    duration = request.duration
+    if "times" in can.requires and request.times is None and not (duration is not None and duration.exact):
+        raise InvalidRequest.of("/times", "missing", "the method needs times (or a duration with min equal to max)")
+    moving = np.ptp(request.waypoints, axis=0) > 0
+    for side in (request.start, request.end):
+        for name in side.given():
+            moving |= getattr(side, name) != 0
+    for quantity in ("velocity", "acceleration", "jerk"):
+        if quantity not in can.requires:
+            continue
+        limit = getattr(request.limits, quantity)
+        if limit is None:
+            raise InvalidRequest.of(f"/limits/{quantity}", "missing", f"the method needs a {quantity} limit")
+        lacking = moving & ~(np.isfinite(limit.lower) & np.isfinite(limit.upper))
+        if lacking.any():
+            reason = f"joint {int(np.argmax(lacking))} moves, so its {quantity} must be limited on both sides"
+            raise InvalidRequest.of(f"/limits/{quantity}", "bad_limits", reason)
+    if request.times is None:
+        return
+    span = float(request.times[-1] - request.times[0])
+    if can.timing == "given" and duration is not None and not _within(span, duration.min, duration.max):
+        raise InvalidRequest.of("/duration", "conflict", f"the times span {span:g} s")
+    for i, bounds in enumerate(request.segment_durations or ()):
+        step = float(request.times[i + 1] - request.times[i])
+        if can.timing == "given" and bounds is not None and not _within(step, bounds.min, bounds.max):
+            raise InvalidRequest.of(f"/segment_durations/{i}", "conflict", f"the times give the segment {step:g} s")
+
+
+def _within(value: float, low: float, high: float) -> bool:
+    return low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
+
+
+def _merged(request: PlanRequest) -> tuple[PlanRequest, NDArray[np.int64]]:
+    """Merge consecutive waypoints that are equal (or closer than rounding) on segments that may take no time."""
+    points = request.waypoints
+    same = np.abs(np.diff(points, axis=0)).max(axis=1) <= SAME * float(np.ptp(points, axis=0).max())
+    for i, bounds in enumerate(request.segment_durations or ()):
+        if bounds is not None and bounds.min > 0:
+            same[i] = False
+    keep = np.concatenate([[True], ~same])
+    if keep[1:].any() and same[-1]:  # the ends stay exact: of a last run of equals the very last waypoint is kept
+        keep[np.flatnonzero(keep)[-1]] = False
+        keep[-1] = True
+    kept = np.cumsum(np.concatenate([[True], ~same])) - 1
+    if not keep[1:].any():
+        keep[-1], kept[-1] = True, 1  # two waypoints remain, even where nothing moves
+    segments = np.flatnonzero(~same) if (~same).any() else np.array([0])
+
+    def shorter(entries: tuple[Any, ...] | None) -> tuple[Any, ...] | None:
+        return None if entries is None else tuple(entries[i] for i in segments)
+
+    if keep.all():
+        return request, kept
+    return replace(
+        request,
+        waypoints=points[keep],
+        segment_limits=shorter(request.segment_limits),
+        segment_durations=shorter(request.segment_durations),
+    ), kept
+
+
+def _resolved(request: PlanRequest, can: Capabilities, side: str) -> Boundary:
+    """Return the end state with the method's defaults filled in: zero where it takes or forces a derivative."""
+    given: Boundary = getattr(request, side)
+    names = getattr(can, side) | can.rests
+    if request.limits.jerk is None:
+        names -= can.with_jerk
+    zero = np.zeros(request.dims)
+    return Boundary(**{n: zero if getattr(given, n) is None else getattr(given, n) for n in names})
+
+
+def _moving(state: Boundary) -> bool:
+    return any(getattr(state, name).any() for name in state.given())
+
+
+def _refuse_hopeless(request: PlanRequest, timed: bool) -> None:
+    """Refuse what no motion can cure: a waypoint, an end state or (``timed``) a mean speed beyond its limit."""
+    last = request.count - 2
+    _refuse_beyond(request, 0, request.waypoints[:-1], 0, "a waypoint")
+    _refuse_beyond(request, 0, request.waypoints[1:], 0, "a waypoint")
+    if timed and request.times is not None:
+        mean = np.diff(request.waypoints, axis=0) / np.diff(request.times)[:, None]
+        _refuse_beyond(request, 1, mean, 0, "the mean velocity between two waypoints")
+    for side, segment in ((request.start, 0), (request.end, last)):
+        for order in (1, 2, 3):
+            state = getattr(side, QUANTITIES[order], None)
+            if state is not None:
+                _refuse_beyond(request, order, state[None], segment, "the state asked at an end")
+
+
+def _refuse_beyond(request: PlanRequest, order: int, values: Array, first: int, what: str) -> None:
+    """Refuse values, one row a segment from segment ``first`` on, that lie beyond their limits."""
+    limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
+    lower, upper = limit.lower[first : first + len(values)], limit.upper[first : first + len(values)]
+    slack = 1e-9 * magnitude(lower, upper)
+    outside = (values > upper + slack) | (values < lower - slack)
+    if outside.any():
+        row, joint = (int(i) for i in np.argwhere(outside)[0])
+        value, segment = float(values[row, joint]), first + row
+        raise Infeasible(
+            f"{what} breaks the {QUANTITIES[order]} limit of joint {joint} on segment {segment}",
+            joint=joint,
+            quantity=QUANTITIES[order],
+            segment=segment,
+            time=None if request.times is None else float(request.times[segment]),
+            bound=float(upper[row, joint] if value > upper[row, joint] else lower[row, joint]),
+            needed=value,
+            certified=True,
+        )

@@ -1,0 +1,1 @@
+"""Interpolation as functions: points and times (or knots) in, a trajectory out."""

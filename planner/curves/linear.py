@@ -1,0 +1,22 @@
+"""Piecewise linear interpolation."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..options import Options
+from ..trajectory import Trajectory
+
+
+class LinearOptions(Options):
+    """Linear interpolation has no options."""
+
+
+def linear(times: ArrayLike, points: ArrayLike) -> Trajectory:
+    """Return the polyline q(t) = (1 - u) q_i + u q_{i+1}, u = (t - t_i) / (t_{i+1} - t_i); class C0.
+
+    Parameters
+    ----------
+    times : (N,), increasing
+    points : (N, D)
+    """
+    return Trajectory.from_hermite(times, np.asarray(points, dtype=np.float64))

@@ -1,0 +1,17 @@
+"""The method table, in order of presentation. A method is one file here and one row below."""
+
+from ..method import Method
+from .cubic_spline import CUBIC_SPLINE
+from .linear import LINEAR
+from .time_scaled import TIME_SCALED
+from .trapezoidal import TRAPEZOIDAL
+
+METHODS: dict[str, Method] = {
+    m.id: m
+    for m in (
+        LINEAR,
+        CUBIC_SPLINE,
+        TRAPEZOIDAL,
+        TIME_SCALED,
+    )
+}

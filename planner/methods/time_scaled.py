@@ -1,0 +1,99 @@
+"""Method ``time_scaled``."""
+
+import numpy as np
+from pydantic import Field
+
+from ..errors import InvalidRequest
+from ..method import Capabilities, Method, Reference
+from ..paths import CubicSplinePath, PathOptions, build_path, refuse_position_limits
+from ..timing.scaling import slowdown, stretched
+from ..trajectory import Trajectory
+from ..types import Followed, Note, PlanRequest, Solution, Stats
+
+
+class TimeScaledOptions(PathOptions):
+    """Options of uniform time scaling."""
+
+    allow_faster: bool = Field(default=False, description="with times: also speed up, as far as the limits allow")
+
+
+def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
+    """Return the path run through at a uniformly scaled clock: as slow as the limits ask, no slower."""
+    if request.times is not None and options.path.knots is not None:
+        raise InvalidRequest.of("/options/path/knots", "conflict", "the times are the path's knots: send one of both")
+    path = build_path(options.path, request.waypoints, "clamped", request.times)
+    refuse_position_limits(path, request)
+    needed = slowdown(path.curve, request, path.knots)
+    span = path.curve.duration
+    least = needed.factor
+    if request.times is not None and not options.allow_faster:
+        least = max(least, 1.0)
+    steps = np.diff(path.knots)
+    for i, bounds in enumerate(request.segment_durations or ()):
+        least = max(least, 0.0 if bounds is None else bounds.min / steps[i])
+    duration = stretched(least * span, request.duration)
+    if duration == 0.0:
+        raise InvalidRequest.of("/limits", "missing", "needed: a velocity, acceleration or jerk limit, or times")
+    factor = duration / span
+    for i, bounds in enumerate(request.segment_durations or ()):
+        stretched(factor * steps[i], bounds, "segment_duration")
+    start = path.curve.start if request.times is None else float(request.times[0])
+    begin = 0.0 if request.times is None else start
+    trajectory = path.curve.scaled(factor).shifted(begin - start)
+    knots = begin + (path.knots - path.knots[0]) * factor
+    trajectory = Trajectory(_exactly(trajectory.breaks, path.curve.breaks, path.knots, knots), trajectory.coefficients)
+    law = Trajectory.from_hermite([trajectory.start, trajectory.end], [[path.curve.start], [path.curve.end]])
+    notes: tuple[Note, ...] = ()
+    if needed.binding is not None and factor == least == needed.factor:
+        notes = (Note("binding_limit", f"the {needed.binding} limit sets the time scale, {factor:.9g}"),)
+    return Solution(trajectory, knots, Stats("closed_form"), Followed(path.curve, law), notes=notes)
+
+
+def _exactly(breaks: np.ndarray, curve_breaks: np.ndarray, knots: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the breaks with those at waypoints set to the waypoint times, bit by bit."""
+    breaks = breaks.copy()
+    at = np.searchsorted(curve_breaks, knots)
+    there = curve_breaks[np.minimum(at, len(breaks) - 1)] == knots
+    breaks[at[there]] = times[there]
+    return breaks
+
+
+def capabilities(options: TimeScaledOptions) -> Capabilities:
+    """Return what is honoured; only the clamped spline rests at its ends."""
+    clamped = isinstance(options.path, CubicSplinePath) and options.path.boundary in (None, "clamped")
+    spline = isinstance(options.path, CubicSplinePath)
+    return Capabilities(
+        "either",
+        2 if spline else 0,
+        honours=frozenset(
+            {
+                "times",
+                "position",
+                "velocity",
+                "acceleration",
+                "jerk",
+                "segment_limits",
+                "segment_durations",
+                "duration",
+            }
+        ),
+        rests=frozenset({"velocity"}) if clamped else frozenset(),
+    )
+
+
+TIME_SCALED = Method(
+    id="time_scaled",
+    title="Uniform time scaling",
+    solve=solve,
+    options=TimeScaledOptions,
+    family="time_optimal",
+    summary="A path slowed uniformly until its exact extrema keep the limits.",
+    formula="t -> alpha t,  alpha = max(v_pk / v_max, sqrt(a_pk / a_max), cbrt(j_pk / j_max))",
+    reference=Reference(
+        "J. M. Hollerbach", "Dynamic scaling of manipulator trajectories", 1984, "https://doi.org/10.1115/1.3149652"
+    ),
+    capabilities=capabilities,
+    path="fixed",
+    objective="duration",
+    variants=({"path": {"kind": "cubic_spline", "boundary": "natural"}}, {"path": {"kind": "linear"}}),
+)

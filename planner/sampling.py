@@ -1,0 +1,79 @@
+"""Sampling: position, velocity, acceleration and jerk of a trajectory at chosen times, from its exact pieces."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InvalidRequest, TooLarge
+from .trajectory import Trajectory
+from .types import Sampling
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Times (M,) in s and the derivatives of order 0 to 3 at them, (M, D) each."""
+
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+
+def sample_count(sampling: Sampling, duration: float) -> int:
+    """Return how many samples a trajectory of that duration gets."""
+    if sampling.times is not None:
+        return len(sampling.times)
+    if duration == 0.0:
+        return 2
+    if sampling.dt is not None:
+        return 1 + max(1, math.ceil(min(duration / sampling.dt, 1e18) - 1e-9))
+    assert sampling.count is not None
+    return sampling.count
+
+
+def sample(trajectory: Trajectory, sampling: Sampling, most: int | None = None) -> Samples:
+    """Sample a trajectory.
+
+    With ``dt`` and ``count`` the last sample is exactly the end, never doubled. At a jump the value from the right is
+    given, at the end the one from the left. A trajectory without duration gives two equal samples.
+
+    Parameters
+    ----------
+    most : int
+        Cap on samples x joints, decided before anything is allocated.
+
+    Raises
+    ------
+    TooLarge
+        More than ``most`` numbers per derivative.
+    InvalidRequest
+        A sampling time outside the trajectory (``out_of_range``).
+    """
+    count = sample_count(sampling, trajectory.duration)
+    refuse_too_many(count, trajectory.dims, most)
+    start, end = trajectory.start, trajectory.end
+    if sampling.times is not None:
+        times = sampling.times
+        outside = (times < start) | (times > end)
+        if outside.any():
+            i = int(np.argmax(outside))
+            raise InvalidRequest.of(f"/sampling/times/{i}", "out_of_range", f"must lie in [{start!r}, {end!r}]")
+    elif sampling.dt is not None and trajectory.duration > 0:
+        times = start + sampling.dt * np.arange(count, dtype=np.float64)
+        times[-1] = end
+    else:
+        times = np.linspace(start, end, count, dtype=np.float64)
+    times = np.clip(times, start, end)
+    return Samples(times, *(trajectory(times, order) for order in range(4)))
+
+
+def refuse_too_many(count: int, dims: int, most: int | None) -> None:
+    """Raise TooLarge if ``count`` samples of ``dims`` joints are over the cap."""
+    if most is not None and count * dims > most:
+        hint = f"{count:,} samples of {dims} joints were asked; take a larger dt, or include polynomial, not samples"
+        raise TooLarge("samples x joints", most, hint)

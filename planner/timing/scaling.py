@@ -1,0 +1,83 @@
+"""Uniform scaling of time: t -> factor t divides the i-th derivative by factor^i and leaves the path alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Infeasible
+from ..limits import QUANTITIES, DurationBounds, magnitude, segment_bounds
+from ..trajectory import Trajectory
+from ..types import PlanRequest
+
+Array = NDArray[np.float64]
+
+#: Factors are raised by this, so that rounding cannot break the limit that binds.
+STRICT = 1e-13
+
+
+@dataclass(frozen=True)
+class Slowdown:
+    """The smallest factor that keeps every limit, and the quantity that binds (None if nothing is limited)."""
+
+    factor: float
+    binding: str | None
+
+
+def slowdown(trajectory: Trajectory, request: PlanRequest, waypoint_times: Array) -> Slowdown:
+    """Return the smallest uniform factor that makes a trajectory keep its limits, from the exact extrema.
+
+    factor = max over joints and segments of v/v_max, sqrt(a/a_max), cbrt(j/j_max); below 1 there is room.
+
+    Raises
+    ------
+    Infeasible
+        A limited derivative is unbounded because a lower one jumps: no factor helps.
+    """
+    trajectory = trajectory.split(waypoint_times)
+    middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
+    segment = np.clip(np.searchsorted(waypoint_times, middles, side="right") - 1, 0, request.count - 2)
+    found = trajectory.extrema(4)
+    best, jumping = Slowdown(0.0, None), np.zeros(trajectory.dims, dtype=bool)
+    for order in (1, 2, 3):
+        lower_order = order - 1
+        jumps = trajectory.counted_jumps(lower_order, found.peak(lower_order), 1.0)
+        jumping = jumping | jumps.any(axis=0)
+        limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
+        bounded = (np.isfinite(limit.lower) | np.isfinite(limit.upper)).any(axis=0)
+        if (jumping & bounded).any():
+            joint = int(np.argmax(jumping & bounded))
+            raise Infeasible(
+                f"the path's derivative of order {lower_order} jumps in joint {joint}, so its {QUANTITIES[order]} is "
+                "unbounded at any speed: choose a smoother path, or a method that stops there",
+                joint=joint,
+                quantity=QUANTITIES[order],
+                bound=float(magnitude(limit.lower, limit.upper)[0, joint]),
+                certified=True,
+            )
+        ratio = np.maximum(found.high[order] / limit.upper[segment], found.low[order] / limit.lower[segment]).max()
+        factor = float(max(ratio, 0.0)) ** (1.0 / order)
+        if factor > best.factor:
+            best = Slowdown(factor, QUANTITIES[order])
+    return Slowdown(best.factor * (1.0 + STRICT), best.binding)
+
+
+def stretched(least: float, bounds: DurationBounds | None, what: str = "duration") -> float:
+    """Return the shortest allowed duration that is at least ``least``.
+
+    Raises
+    ------
+    Infeasible
+        Even the shortest the method can do is longer than ``bounds.max``.
+    """
+    if bounds is None:
+        return least
+    if least > bounds.max * (1.0 + 1e-9):
+        raise Infeasible(
+            f"the shortest duration this method can do is {least:.9g} s, longer than the {bounds.max:.9g} s allowed",
+            quantity=what,
+            bound=bounds.max,
+            needed=least,
+            minimum_duration=least,
+        )
+    return max(min(least, bounds.max), bounds.min)

@@ -1,0 +1,59 @@
+"""Durations of segments between stops: how much longer than their shortest they must be."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Infeasible
+from ..types import PlanRequest
+from .scaling import stretched
+
+Array = NDArray[np.float64]
+
+
+def segment_bounds_of(request: PlanRequest) -> tuple[Array, Array]:
+    """Return the least and largest duration asked for every segment, (N - 1,) each."""
+    bounds = request.segment_durations or [None] * (request.count - 1)
+    least = np.array([0.0 if b is None else b.min for b in bounds])
+    return least, np.array([np.inf if b is None else b.max for b in bounds])
+
+
+def segment_durations(shortest: Array, request: PlanRequest) -> Array:
+    """Return durations that keep every bound, as short as possible; a longer total is shared in proportion.
+
+    Parameters
+    ----------
+    shortest : (N - 1,)
+        What each segment needs at least.
+
+    Raises
+    ------
+    Infeasible
+        A segment, or the whole, needs longer than it may take; or may not take as long as it must.
+    """
+    least, most = segment_bounds_of(request)
+    for i in np.flatnonzero(shortest > most * (1.0 + 1e-9)):
+        raise Infeasible(
+            f"segment {i} takes at least {shortest[i]:.9g} s with stops at both ends",
+            quantity="segment_duration",
+            segment=int(i),
+            bound=float(most[i]),
+            needed=float(shortest[i]),
+        )
+    durations = np.minimum(np.maximum(shortest, least), most)
+    total = stretched(float(durations.sum()), request.duration)
+    if total > most.sum() * (1.0 + 1e-9):
+        raise Infeasible(
+            "the segments' longest durations add up to less than the whole must take",
+            quantity="duration",
+            bound=float(total),
+            needed=float(most.sum()),
+            certified=True,
+        )
+    for _ in range(len(durations)):  # those that reach their longest drop out, at least one a round
+        missing = total - durations.sum()
+        room = durations < most
+        if missing <= 1e-15 * total or not room.any():
+            break
+        weight = np.where(room, np.maximum(durations, 1e-12 * total), 0.0)
+        durations = np.minimum(durations + missing * weight / weight.sum(), most)
+    return durations

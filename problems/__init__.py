@@ -1,0 +1,1 @@
+"""What is minimised, subject to what: small frozen dataclasses over arrays, one statement a file, no solver inside."""
