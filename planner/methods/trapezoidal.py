@@ -16,6 +16,9 @@ from ..types import Bound, Followed, PlanRequest, Solution, Stats
 Array = NDArray[np.float64]
 
 
+Phase = tuple[float, tuple[float, float, float]]
+
+
 class TrapezoidalOptions(Options):
     """The trapezoidal profile has no options."""
 
@@ -55,12 +58,13 @@ def _along(request: PlanRequest) -> tuple[Array, Array, Array]:
     def along(order: int, forward: bool) -> Array:
         limit = segment_bounds(request.limits, request.segment_limits, order, count, dims)
         side = np.where((move > 0) == forward, limit.upper, -limit.lower)
-        return np.divide(side, size, out=np.full_like(size, np.inf), where=size > 0).min(axis=1)
+        ratio = np.divide(side, size, out=np.full_like(size, np.inf), where=size > 0)
+        return np.asarray(ratio.min(axis=1))
 
     return along(1, True), along(2, True), along(2, False)
 
 
-def _trapezoid(start: int, velocity: float, rising: float, falling: float, slower: float) -> list[tuple[float, tuple]]:
+def _trapezoid(start: int, velocity: float, rising: float, falling: float, slower: float) -> list[Phase]:
     """Return (duration, powers of the local time) of the phases of a unit move that starts at ``start``."""
     peak = min(velocity, np.sqrt(2.0 / (1.0 / rising + 1.0 / falling)))
     up, down = peak / rising, peak / falling

@@ -1,0 +1,151 @@
+"""Method ``ruckig``."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.rest_to_rest import StopsAtWaypoints, double_integrator, triple_integrator
+
+from ..errors import Infeasible
+from ..limits import QUANTITIES, Boundary, Limit, segment_bounds
+from ..method import Capabilities, Method, Reference
+from ..options import Options
+from ..timing.state_to_state import Segment, time_optimal
+from ..timing.stops import segment_bounds_of, segment_durations
+from ..trajectory import Trajectory
+from ..types import Bound, Note, PlanRequest, Solution, Stats
+
+Array = NDArray[np.float64]
+
+
+class RuckigOptions(Options):
+    """The ruckig library has no options here: time-synchronised, position control."""
+
+
+def solve(request: PlanRequest, options: RuckigOptions) -> Solution:
+    """Return time-optimal segments from waypoint to waypoint, at rest in between."""
+    segments = _segments(request)
+    parts = [_hold(s) if _still(s) else time_optimal(s) for s in segments]
+    durations = segment_durations(np.array([p.duration for p in parts]), request)
+    for i, (segment, part, duration) in enumerate(zip(segments, parts, durations, strict=True)):
+        if duration <= part.duration * (1.0 + 1e-12):
+            continue
+        if _still(segment):
+            parts[i] = Trajectory.hold(segment.p0, 0.0, duration)
+        elif segment.rests:
+            parts[i] = part.scaled(duration / part.duration)
+        else:
+            parts[i] = time_optimal(replace(segment, least=duration))
+    times = np.concatenate([[0.0], np.cumsum([p.duration for p in parts])])
+    kept = [p.shifted(t) for p, t in zip(parts, times, strict=False) if p.duration > 0]
+    trajectory = Trajectory.concatenate(kept)
+    for segment, part in zip(segments, parts, strict=True):
+        if not segment.rests:
+            _refuse_overshoot(segment, part, request)
+    notes: tuple[Note, ...] = ()
+    jerk = request.limits.jerk
+    if jerk is not None and (jerk.lower != -jerk.upper).any():
+        notes = (Note("jerk_symmetric", "ruckig takes one jerk limit per joint: the smaller side was used for both"),)
+    return Solution(trajectory, times, Stats("ruckig"), bound=_bound(segments, request), notes=notes)
+
+
+def _segments(request: PlanRequest) -> list[Segment]:
+    count, dims = request.count - 1, request.dims
+    limits = [segment_bounds(request.limits, request.segment_limits, m, count, dims) for m in (1, 2, 3)]
+    jerk = np.minimum(limits[2].upper, -limits[2].lower)
+    loose = [Limit(np.nan_to_num(b.lower, neginf=-1e9), np.nan_to_num(b.upper, posinf=1e9)) for b in limits[:2]]
+    zero = np.zeros(dims)
+
+    def state(boundary: Boundary, name: str) -> Array:
+        value = getattr(boundary, name)
+        return zero if value is None else np.asarray(value)
+
+    return [
+        Segment(
+            p0=request.waypoints[i],
+            v0=state(request.start, "velocity") if i == 0 else zero,
+            a0=state(request.start, "acceleration") if i == 0 else zero,
+            p1=request.waypoints[i + 1],
+            v1=state(request.end, "velocity") if i == count - 1 else zero,
+            a1=state(request.end, "acceleration") if i == count - 1 else zero,
+            velocity=Limit(loose[0].lower[i], loose[0].upper[i]),
+            acceleration=Limit(loose[1].lower[i], loose[1].upper[i]),
+            jerk=jerk[i],
+        )
+        for i in range(count)
+    ]
+
+
+def _still(segment: Segment) -> bool:
+    return segment.rests and not (segment.p1 - segment.p0).any()
+
+
+def _hold(segment: Segment) -> Trajectory:
+    return Trajectory.hold(segment.p0, 0.0, 0.0)
+
+
+def _refuse_overshoot(segment: Segment, part: Trajectory, request: PlanRequest) -> None:
+    """Refuse where the asked end state itself leads beyond a limit, so that ruckig brakes outside of it."""
+    found = part.extrema(4)
+    for order, limit in ((1, segment.velocity), (2, segment.acceleration)):
+        over = np.maximum(found.high[order] - limit.upper, limit.lower - found.low[order]) / limit.scale()
+        if over.max() > 1e-9:
+            piece, joint = (int(i) for i in np.unravel_index(int(np.argmax(over)), over.shape))
+            high = found.high[order][piece, joint] > limit.upper[joint]
+            raise Infeasible(
+                f"the state asked at an end leads beyond the {QUANTITIES[order]} limit of joint {joint}",
+                joint=joint,
+                quantity=QUANTITIES[order],
+                segment=0 if segment.v0.any() or segment.a0.any() else request.count - 2,
+                bound=float((limit.upper if high else limit.lower)[joint]),
+                needed=float((found.high if high else found.low)[order][piece, joint]),
+            )
+
+
+def _bound(segments: list[Segment], request: PlanRequest) -> Bound | None:
+    """Return the closed-form bound for stops at all waypoints, where the limits are symmetric and the ends at rest."""
+    symmetric = all(
+        (s.velocity.lower == -s.velocity.upper).all() and (s.acceleration.lower == -s.acceleration.upper).all()
+        for s in segments
+    )
+    jerk = request.limits.jerk
+    if not symmetric or not all(s.rests for s in segments) or (jerk is not None and (jerk.lower != -jerk.upper).any()):
+        return None
+    move = np.stack([np.abs(s.p1 - s.p0) for s in segments])
+    v, a = np.stack([s.velocity.upper for s in segments]), np.stack([s.acceleration.upper for s in segments])
+    j = np.stack([s.jerk for s in segments])
+    limited = np.isfinite(j)
+    shortest = np.where(
+        limited, triple_integrator(move, v, a, np.where(limited, j, 1.0)), double_integrator(move, v, a, a)
+    )
+    least, _ = segment_bounds_of(request)
+    total = 0.0 if request.duration is None else request.duration.min
+    return Bound("method", StopsAtWaypoints(shortest, least, total))
+
+
+RUCKIG = Method(
+    id="ruckig",
+    title="Ruckig",
+    solve=solve,
+    options=RuckigOptions,
+    family="time_optimal",
+    summary="Jerk-limited time-optimal motion by the ruckig library, with a stop at every waypoint.",
+    formula="min T  s.t.  |v| <= v_max, |a| <= a_max, |j| <= j_max, per joint; all joints arrive together",
+    reference=Reference(
+        "L. Berscheid and T. Kröger",
+        "Jerk-limited real-time trajectory generation with arbitrary target states",
+        2021,
+        "https://doi.org/10.15607/RSS.2021.XVII.015",
+    ),
+    capabilities=lambda options: Capabilities(
+        "chosen",
+        1,
+        requires=frozenset({"velocity", "acceleration"}),
+        honours=frozenset({"velocity", "acceleration", "jerk", "segment_limits", "segment_durations", "duration"}),
+        start=frozenset({"velocity", "acceleration"}),
+        end=frozenset({"velocity", "acceleration"}),
+        with_jerk=frozenset({"acceleration"}),
+    ),
+    objective="duration",
+)

@@ -1,0 +1,154 @@
+"""Time-optimal state-to-state motion by the ruckig library, in units in which every number is near one.
+
+ruckig compares with absolute tolerances and refuses limits above 1e9, so that a move of 1e-16 beside one of 1e6 fails.
+Each joint gets a unit of length of its own and all share a unit of time; only time couples the joints.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SolverFailed
+from ..limits import Limit
+from ..trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+#: In scaled units every move takes about one, so limits above such a cap hardly bind; where ruckig fails with the first
+#: cap (it takes limits up to 1e9, but mixes of scales trouble it) the next is tried.
+CAPS = (1e8, 1e6, 1e4)
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """From one state to another under limits; arrays (D,), jerk may be infinite."""
+
+    p0: Array
+    v0: Array
+    a0: Array
+    p1: Array
+    v1: Array
+    a1: Array
+    velocity: Limit
+    acceleration: Limit
+    jerk: Array
+    least: float = 0.0
+
+    @property
+    def rests(self) -> bool:
+        """Whether it starts and ends at rest."""
+        return not (self.v0.any() or self.a0.any() or self.v1.any() or self.a1.any())
+
+
+def time_optimal(segment: Segment) -> Trajectory:
+    """Return the shortest motion (at least ``segment.least`` long) as cubic pieces, starting at time 0.
+
+    Raises
+    ------
+    SolverFailed
+        ruckig finds no motion.
+    """
+    second, unit = _units(segment)
+    for cap in CAPS:
+        scaled = _scaled(segment, second, unit, cap)
+        try:
+            duration, phases = _ruckig(scaled)
+            break
+        except SolverFailed:
+            if cap == CAPS[-1]:
+                raise
+    pieces = _pieces(duration, phases, scaled)
+    coefficients = pieces.coefficients * unit
+    coefficients[-1] += segment.p0
+    return Trajectory(pieces.breaks * second, coefficients)
+
+
+def _units(s: Segment) -> tuple[float, Array]:
+    """Return the unit of time, about the slowest joint's duration, and each joint's unit of length."""
+    move = np.abs(s.p1 - s.p0)
+    v = np.minimum(s.velocity.upper, -s.velocity.lower)
+    a = np.minimum(s.acceleration.upper, -s.acceleration.lower)
+    speed, push = np.maximum(np.abs(s.v0), np.abs(s.v1)), np.maximum(np.abs(s.a0), np.abs(s.a1))
+    durations = np.stack(
+        [move / v, np.sqrt(move / a), np.cbrt(move / s.jerk), speed / a, np.sqrt(speed / s.jerk), push / s.jerk]
+    )
+    second = float(durations.max())
+    second = second if second > 0 else 1.0
+    unit = np.maximum(np.maximum(move, speed * second), push * second**2)
+    return second, np.where(unit > 0, unit, 1.0)
+
+
+def _scaled(s: Segment, second: float, unit: Array, cap: float) -> Segment:
+    v, a, j = second / unit, second**2 / unit, second**3 / unit
+    return replace(
+        s,
+        p0=np.zeros_like(s.p0),
+        v0=s.v0 * v,
+        a0=s.a0 * a,
+        p1=(s.p1 - s.p0) / unit,
+        v1=s.v1 * v,
+        a1=s.a1 * a,
+        velocity=Limit(np.maximum(s.velocity.lower * v, -cap), np.minimum(s.velocity.upper * v, cap)),
+        acceleration=Limit(np.maximum(s.acceleration.lower * a, -cap), np.minimum(s.acceleration.upper * a, cap)),
+        jerk=np.where(np.isfinite(s.jerk), np.minimum(s.jerk * j, cap), np.inf),
+        least=s.least / second,
+    )
+
+
+def _ruckig(s: Segment) -> tuple[float, list[list[tuple[float, float, float, float, float]]]]:
+    """Return the duration and, per joint, the phases (duration, position, velocity, acceleration, jerk)."""
+    import ruckig
+
+    dims = len(s.p0)
+    given = ruckig.InputParameter(dims)
+    given.current_position, given.target_position = s.p0.tolist(), s.p1.tolist()
+    given.current_velocity, given.target_velocity = s.v0.tolist(), s.v1.tolist()
+    given.current_acceleration, given.target_acceleration = s.a0.tolist(), s.a1.tolist()
+    given.max_velocity, given.min_velocity = s.velocity.upper.tolist(), s.velocity.lower.tolist()
+    given.max_acceleration, given.min_acceleration = s.acceleration.upper.tolist(), s.acceleration.lower.tolist()
+    given.max_jerk = s.jerk.tolist()
+    if s.least > 0:
+        given.minimum_duration = s.least
+    made = ruckig.Trajectory(dims)
+    try:
+        result = ruckig.Ruckig(dims).calculate(given, made)
+    except (ruckig.RuckigError, ValueError) as error:
+        raise SolverFailed("ruckig", str(error).strip().splitlines()[0][:300]) from None
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise SolverFailed("ruckig", str(result))
+    phases = []
+    for profile in made.profiles[0]:
+        braking = zip(profile.brake.t, profile.brake.p, profile.brake.v, profile.brake.a, profile.brake.j, strict=True)
+        main = zip(profile.t, profile.p, profile.v, profile.a, profile.j, strict=False)
+        phases.append([p for p in (*braking, *main) if p[0] > 0.0])
+    return float(made.duration), phases
+
+
+def _pieces(duration: float, phases: list[list[tuple[float, float, float, float, float]]], s: Segment) -> Trajectory:
+    """Return the joints' phases on common breaks; breaks closer than rounding are one."""
+    ends = [np.cumsum([p[0] for p in joint]) for joint in phases]
+    found = np.unique(np.concatenate([[0.0], *ends]))
+    found = found[found < duration * (1.0 - 1e-12)]
+    breaks = np.append(found[np.concatenate([[True], np.diff(found) > 1e-12 * duration])], duration)
+    h = np.diff(breaks)
+    powers = np.zeros((4, len(h), len(phases)))
+    for d, joint in enumerate(phases):
+        if not joint:  # this joint does not move
+            powers[0, :, d] = s.p0[d]
+            continue
+        table = np.array(joint)
+        starts = np.concatenate([[0.0], ends[d][:-1]])
+        row = np.clip(np.searchsorted(ends[d], breaks[:-1] + 0.5 * h, side="right"), 0, len(table) - 1)
+        _, p, v, a, j = table[row].T
+        u = breaks[:-1] - starts[row]
+        done = breaks[:-1] + 0.5 * h > ends[d][-1]  # past the end by rounding: stay
+        powers[:, :, d] = (
+            p + u * (v + u * (a / 2 + u * j / 6)),
+            v + u * (a + u * j / 2),
+            (a + u * j) / 2,
+            j / 6,
+        )
+        powers[1:, done, d] = 0.0
+        powers[0, done, d] = s.p1[d]
+    return Trajectory.from_powers(breaks, powers)
