@@ -166,10 +166,13 @@ def _limit_row(motion: _Motion, order: int) -> Check | None:
     else:  # the ratio says more than the distance where the sides differ
         badness = np.stack([high / upper, low / lower])
         badness = np.where(excess > 0, np.maximum(badness, 1.0 + excess), badness)
-    which, piece, joint = (int(i) for i in np.unravel_index(int(np.argmax(badness)), badness.shape))
+    worst = float(badness.max())
+    ties = np.argwhere(badness >= worst - 1e-9 * abs(worst))  # the earliest, whatever rounding prefers
+    when = np.stack([motion.at_high, motion.at_low])[:, order]
+    which, piece, joint = (int(i) for i in ties[np.argmin(when[tuple(ties.T)])])
     value = (high, low)[which][piece, joint]
     bound = (upper, lower)[which][piece, joint]
-    time = (motion.at_high, motion.at_low)[which][order, piece, joint]
+    time = when[which, piece, joint]
     if order == 0:
         half = 0.5 * (upper[piece, joint] - lower[piece, joint])
         middle = 0.5 * (upper[piece, joint] + lower[piece, joint])

@@ -3,6 +3,7 @@
 from ..method import Method
 from .cubic_spline import CUBIC_SPLINE
 from .linear import LINEAR
+from .minimum_jerk import MINIMUM_JERK
 from .ruckig import RUCKIG
 from .time_scaled import TIME_SCALED
 from .trapezoidal import TRAPEZOIDAL
@@ -12,6 +13,7 @@ METHODS: dict[str, Method] = {
     for m in (
         LINEAR,
         CUBIC_SPLINE,
+        MINIMUM_JERK,
         TRAPEZOIDAL,
         RUCKIG,
         TIME_SCALED,

@@ -1,0 +1,1 @@
+"""The minimum-derivative pipeline: elimination, cutting planes, infeasibility explained."""

@@ -1,0 +1,154 @@
+"""Minimum jerk at fixed times: free by elimination, with limits by cutting planes at the exact extrema.
+
+The free optimum is the answer wherever it keeps the limits. Otherwise a row is added at each extremum that breaks one
+and the quadratic program is solved again, until none does: limits then hold at all times, not at samples. All of it in
+units in which the median gap and each joint's range are one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.banded_qp import BandedQP, DualPoint
+from problems.minimum_jerk import MinimumJerk
+
+from ..deadline import Deadline
+from ..errors import InvalidRequest, SolverFailed
+from ..limits import segment_bounds
+from ..solvers import Backend, select
+from ..solvers.qp import solve_qp
+from ..trajectory import Trajectory
+from ..types import Bound, PlanRequest, Solution, Stats
+from .cuts import Cuts, JointBounds
+from .elastic import least_relaxation
+
+Array = NDArray[np.float64]
+
+#: Neighbouring gaps with a smaller ratio leave too few digits for the elimination.
+UNEVEN = 1e-6
+ROUNDS = 60
+
+
+def minimum_jerk(request: PlanRequest, backend: str) -> Solution:
+    """Return the minimum-jerk trajectory through the waypoints at their times, within the limits.
+
+    Raises
+    ------
+    InvalidRequest
+        Times too uneven for double precision (``out_of_range``).
+    Infeasible
+        One quintic per gap cannot keep a joint's limits at these times; certified, with the smallest relaxation.
+    SolverFailed, TimeLimit
+    """
+    assert request.times is not None
+    deadline = Deadline(request.timeout)
+    gaps = np.diff(request.times)
+    _refuse_uneven(gaps)
+    second = float(np.median(gaps))
+    unit = np.ptp(request.waypoints, axis=0)
+    unit = np.where(unit > 0, unit, max(float(unit.max()), 1.0))
+    problem = _statement(request, gaps / second, second, unit)
+    programs = [problem.joint(d) for d in range(request.dims)]
+    solved = [_Joint(p.free_minimum() if len(p.gradient) else np.zeros(0), np.zeros(0), p) for p in programs]
+    name, iterations, seconds = "block_elimination", 1, 0.0
+    bounds = [_joint_bounds(request, d, second, unit[d]) for d in range(request.dims)]
+    for d in range(request.dims):
+        cuts = Cuts(problem.only(d), d, bounds[d])
+        if backend == "auto" and not cuts.broken(solved[d].y).any():
+            continue
+        solved[d], name, rounds, spent = _within_limits(cuts, backend, deadline)
+        iterations, seconds = iterations + rounds, seconds + spent
+    y = np.stack([s.y for s in solved], axis=1)
+    velocity, acceleration = problem.states(y)
+    trajectory = Trajectory.from_hermite(
+        request.times, request.waypoints, velocity * unit / second, acceleration * unit / second**2
+    )
+    evidence = DualPoint(tuple(s.program for s in solved), tuple(s.z for s in solved), unit**2 / second**5)
+    return Solution(
+        trajectory, request.times, Stats(name, "solved", iterations, seconds), bound=Bound("method", evidence)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """One joint's node states and multipliers, and the program (with the limits as asked) they belong to."""
+
+    y: Array
+    z: Array
+    program: BandedQP
+
+
+def _refuse_uneven(gaps: Array) -> None:
+    ratio = gaps[1:] / gaps[:-1]
+    ratio = np.minimum(ratio, 1.0 / ratio)
+    if len(ratio) and ratio.min() < UNEVEN:
+        i = int(np.argmin(ratio)) + 1
+        reason = (
+            f"neighbouring gaps differ by a factor of {1.0 / ratio.min():.3g}; more than 1e6 cannot be solved safely"
+        )
+        raise InvalidRequest.of(f"/times/{i}", "out_of_range", reason)
+
+
+def _statement(request: PlanRequest, h: Array, second: float, unit: Array) -> MinimumJerk:
+    zero = np.zeros(request.dims)
+    rates = [
+        [zero if v is None else np.asarray(v) * second**m / unit for m, v in ((1, b.velocity), (2, b.acceleration))]
+        for b in (request.start, request.end)
+    ]
+    # positions relative to the first waypoint: only steps matter, and none of their digits is lost
+    return MinimumJerk(h, (request.waypoints - request.waypoints[0]) / unit, np.stack(rates[0]), np.stack(rates[1]))
+
+
+def _joint_bounds(request: PlanRequest, joint: int, second: float, unit: float) -> JointBounds:
+    lower, upper = np.zeros((4, request.count - 1)), np.zeros((4, request.count - 1))
+    for order in range(4):
+        limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
+        offset = request.waypoints[0, joint] if order == 0 else 0.0
+        lower[order] = (limit.lower[:, joint] - offset) * second**order / unit
+        upper[order] = (limit.upper[:, joint] - offset) * second**order / unit
+    return JointBounds(lower, upper, np.array([unit / second**m for m in range(4)]), float(request.waypoints[0, joint]))
+
+
+def _within_limits(cuts: Cuts, backend: str, deadline: Deadline) -> tuple[_Joint, str, int, float]:
+    """Return the joint's optimum within its limits, the back end's name, the rounds and the seconds in the solver.
+
+    Limits are first tightened by 1e-7 so that the answer keeps them strictly; where that alone makes the program
+    infeasible, they are kept to rounding.
+    """
+    failure: SolverFailed | None = None
+    for chosen in select("qp", backend):
+        try:
+            return _rounds(cuts, chosen, deadline)
+        except SolverFailed as error:
+            failure = error
+    least_relaxation(cuts, deadline)  # raises Infeasible where that is the reason
+    exact = cuts.exact()
+    for chosen in select("qp", backend):
+        try:
+            return _rounds(exact, chosen, deadline)
+        except SolverFailed as error:
+            failure = error
+    assert failure is not None
+    raise failure
+
+
+def _rounds(cuts: Cuts, backend: Backend, deadline: Deadline) -> tuple[_Joint, str, int, float]:
+    program = cuts.program([], tightened=True)
+    y = program.free_minimum() if len(program.gradient) else np.zeros(0)
+    rows: Sequence[tuple[int, float, int, int]] = []
+    z, seconds, iterations = np.zeros(0), 0.0, 0
+    for _ in range(ROUNDS):
+        found = cuts.new_rows(y)
+        if not found and (rows or backend.name == "piqp"):
+            return _Joint(y, z, cuts.program(rows, tightened=False)), backend.name, iterations, seconds
+        if not len(y):
+            raise SolverFailed(backend.name, "nothing is free")
+        rows = [*rows, *found]
+        answer = solve_qp(cuts.program(rows, tightened=True), backend, deadline.left())
+        y, z = answer.y, answer.z
+        seconds, iterations = seconds + answer.seconds, iterations + max(answer.iterations, 1)
+        if not found:
+            return _Joint(y, z, cuts.program(rows, tightened=False)), backend.name, iterations, seconds
+    raise SolverFailed(backend.name, f"limits still broken after {ROUNDS} rounds")
