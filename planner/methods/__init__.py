@@ -5,7 +5,9 @@ from .cubic_spline import CUBIC_SPLINE
 from .linear import LINEAR
 from .minimum_jerk import MINIMUM_JERK
 from .ruckig import RUCKIG
+from .time_optimal_nlp import TIME_OPTIMAL_NLP
 from .time_scaled import TIME_SCALED
+from .toppra import TOPPRA
 from .trapezoidal import TRAPEZOIDAL
 
 METHODS: dict[str, Method] = {
@@ -17,5 +19,7 @@ METHODS: dict[str, Method] = {
         TRAPEZOIDAL,
         RUCKIG,
         TIME_SCALED,
+        TOPPRA,
+        TIME_OPTIMAL_NLP,
     )
 }

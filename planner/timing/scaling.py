@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Infeasible
-from ..limits import QUANTITIES, DurationBounds, magnitude, segment_bounds
+from ..limits import QUANTITIES, DurationBounds, Limits, magnitude, segment_bounds
 from ..trajectory import Trajectory
 from ..types import PlanRequest
 
@@ -60,6 +60,17 @@ def slowdown(trajectory: Trajectory, request: PlanRequest, waypoint_times: Array
         if factor > best.factor:
             best = Slowdown(factor, QUANTITIES[order])
     return Slowdown(best.factor * (1.0 + STRICT), best.binding)
+
+
+def local_factors(trajectory: Trajectory, limits: Limits) -> Array:
+    """Return the factor by which each piece alone would have to be slowed (or could be sped up), (K,)."""
+    found = trajectory.extrema(4)
+    factors = np.zeros(trajectory.pieces)
+    for order in (1, 2, 3):
+        limit = limits.bounds(order, trajectory.dims)
+        ratio = np.maximum(found.high[order] / limit.upper, found.low[order] / limit.lower).max(axis=1)
+        factors = np.maximum(factors, np.maximum(ratio, 0.0) ** (1.0 / order))
+    return factors
 
 
 def stretched(least: float, bounds: DurationBounds | None, what: str = "duration") -> float:

@@ -1,0 +1,73 @@
+"""Method ``time_optimal_nlp``."""
+
+from pydantic import Field
+
+from ..deadline import Deadline
+from ..method import Capabilities, Method, Reference
+from ..paths import PathOptions, build_path
+from ..timing.following import Units, follow
+from ..timing.grids import initial_grid, refined
+from ..timing.nlp_law import nlp_law
+from ..timing.scaling import local_factors
+from ..trajectory import Trajectory
+from ..types import PlanRequest, Solution
+
+#: Refinement ends when slowing by this much is all that is left to do, or at so many stations.
+GOOD = 1.002
+MOST = 600
+ROUNDS = 3
+
+
+class TimeOptimalNlpOptions(PathOptions):
+    """Options of the time-optimal nonlinear program."""
+
+    stations: int | None = Field(
+        default=None, ge=10, le=2000, description="fixed number of stations (default: about 100, refined where needed)"
+    )
+
+
+def solve(request: PlanRequest, options: TimeOptimalNlpOptions) -> Solution:
+    """Return the path with the law that CasADi and IPOPT find, slowed until the exact extrema keep the limits."""
+    deadline = Deadline(request.timeout)
+    path = build_path(options.path, request.waypoints)
+
+    def timed(stretch: Trajectory, units: Units) -> tuple[Trajectory, float]:
+        grid = initial_grid(stretch, options.stations or max(100, 12 * stretch.pieces))
+        law, spent = nlp_law(stretch, request.limits, units, grid, deadline.left())
+        for _ in range(0 if options.stations else ROUNDS - 1):
+            factors = local_factors(stretch.compose(law), request.limits)
+            if factors.max() <= GOOD or len(grid) > MOST or len(factors) != len(grid) - 1:
+                break
+            grid = refined(grid, factors > 1.0 + 0.25 * (GOOD - 1.0))
+            law, seconds = nlp_law(stretch, request.limits, units, grid, deadline.left())
+            spent += seconds
+        return law, spent
+
+    return follow(path, request, timed, "ipopt")
+
+
+TIME_OPTIMAL_NLP = Method(
+    id="time_optimal_nlp",
+    title="Time-optimal path timing as a nonlinear program",
+    solve=solve,
+    options=TimeOptimalNlpOptions,
+    family="time_optimal",
+    summary="Path timing under velocity, acceleration and jerk limits by CasADi and IPOPT: a slow reference.",
+    formula="min Σ Δt_i  s.t.  |q' ṡ| <= v,  |q'' ṡ² + q' s̈| <= a,  |q''' ṡ³ + 3 q'' ṡ s̈ + q' s⃛| <= j",
+    reference=Reference(
+        "D. Verscheure, B. Demeulenaere, J. Swevers, J. De Schutter and M. Diehl",
+        "Time-optimal path tracking for robots: a convex optimization approach",
+        2009,
+        "https://doi.org/10.1109/TAC.2009.2028959",
+    ),
+    capabilities=lambda options: Capabilities(
+        "chosen",
+        1,
+        requires=frozenset({"acceleration"}),
+        honours=frozenset({"position", "velocity", "acceleration", "jerk", "duration"}),
+        rests=frozenset({"velocity", "acceleration"}),
+        with_jerk=frozenset({"acceleration"}),
+    ),
+    path="fixed",
+    objective="duration",
+)

@@ -1,0 +1,89 @@
+"""Method ``toppra``."""
+
+import time
+
+import numpy as np
+from pydantic import Field
+
+from ..deadline import Deadline
+from ..errors import SolverFailed
+from ..method import Capabilities, Method, Reference
+from ..paths import PathOptions, build_path
+from ..timing.following import Units, follow
+from ..timing.grids import constant_acceleration_law, initial_grid, refined
+from ..timing.scaling import local_factors
+from ..timing.toppra_speeds import toppra_speeds
+from ..trajectory import Trajectory
+from ..types import PlanRequest, Solution
+
+#: Refinement ends when slowing by this much is all that is left to do, or at so many stations.
+GOOD = 1.001
+MOST = 6000
+ROUNDS = 5
+
+
+class ToppraOptions(PathOptions):
+    """Options of TOPP-RA on a path."""
+
+    stations: int | None = Field(
+        default=None,
+        ge=10,
+        le=20_000,
+        description="fixed number of stations (default: about 300, refined where needed)",
+    )
+
+
+def solve(request: PlanRequest, options: ToppraOptions) -> Solution:
+    """Return the path at TOPP-RA's speeds, as exact pieces, slowed until the exact extrema keep the limits."""
+    deadline = Deadline(request.timeout)
+    path = build_path(options.path, request.waypoints)
+
+    def timed(stretch: Trajectory, units: Units) -> tuple[Trajectory, float]:
+        grid = initial_grid(stretch, options.stations or max(300, 20 * stretch.pieces))
+        law, failure, spent = None, None, 0.0
+        for _ in range(1 if options.stations else ROUNDS):
+            deadline.left()
+            started = time.perf_counter()
+            try:
+                law = constant_acceleration_law(grid, toppra_speeds(stretch, request.limits, units, grid))
+            except SolverFailed as error:  # other stations often help
+                failure = error
+                grid = refined(grid, np.ones(len(grid) - 1, dtype=bool))
+                continue
+            finally:
+                spent += time.perf_counter() - started
+            factors = local_factors(stretch.compose(law), request.limits)
+            if factors.max() <= GOOD or len(grid) > MOST or len(factors) != len(grid) - 1:
+                break
+            grid = refined(grid, factors > 1.0 + 0.25 * (GOOD - 1.0))
+        if law is None:
+            raise failure or SolverFailed("toppra", "no parameterisation found")
+        return law, spent
+
+    return follow(path, request, timed, "toppra")
+
+
+TOPPRA = Method(
+    id="toppra",
+    title="TOPP-RA",
+    solve=solve,
+    options=ToppraOptions,
+    family="time_optimal",
+    summary="The toppra library's speeds along a fixed path, as exact pieces instead of its spline refit.",
+    formula="max sdot(s)  s.t.  lower <= q' sdot <= upper,  lower <= q'' sdot² + q' sddot <= upper",
+    reference=Reference(
+        "H. Pham and Q.-C. Pham",
+        "A new approach to time-optimal path parameterization based on reachability analysis",
+        2018,
+        "https://doi.org/10.1109/TRO.2018.2819195",
+    ),
+    capabilities=lambda options: Capabilities(
+        "chosen",
+        1,
+        requires=frozenset({"acceleration"}),
+        honours=frozenset({"position", "velocity", "acceleration", "duration"}),
+        rests=frozenset({"velocity"}),
+    ),
+    path="fixed",
+    objective="duration",
+)

@@ -1,0 +1,113 @@
+"""From speeds along a path to a trajectory: split at corners, compose exactly, slow down until the limits hold."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SolverFailed
+from ..limits import Limits
+from ..paths import Path, refuse_position_limits
+from ..trajectory import Trajectory
+from ..types import Followed, Note, PlanRequest, Solution, Stats
+from .scaling import local_factors, slowdown, stretched
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Units:
+    """Scales in which a stretch of path and its limits are near one.
+
+    ``length`` (D,) of each joint, ``parameter`` about a gap between waypoints, ``second`` about the time for that;
+    ``moving`` (D,) says which joints move at all.
+    """
+
+    length: Array
+    parameter: float
+    second: float
+    moving: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, stretch: Trajectory, limits: Limits) -> "Units":
+        """Return the scales of a stretch of path under limits."""
+        found = stretch.extrema(1)
+        length = found.high[0].max(axis=0) - found.low[0].min(axis=0)
+        moving = length > 1e-14 * max(float(length.max()), 1e-300)
+        parameter = stretch.duration / stretch.pieces
+        rate = float(local_factors(stretch, replace(limits, jerk=None)).max())
+        return cls(np.where(moving, length, 1.0), parameter, rate * parameter if rate > 0 else 1.0, moving)
+
+
+#: Times one smooth stretch of path from rest to rest: a law s(t) that starts at time 0, and the seconds in the solver.
+TimeStretch = Callable[[Trajectory, Units], tuple[Trajectory, float]]
+
+
+def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: str) -> Solution:
+    """Return the trajectory along the path, timed stretch by stretch, at rest at its ends and at its corners.
+
+    A corner is where the path's tangent jumps (with a jerk limit: its curvature too); only a stop passes it within
+    finite acceleration (jerk).
+
+    Raises
+    ------
+    Infeasible
+        The path leaves the position limits, or takes longer than the duration allows.
+    SolverFailed
+        The timing gives no usable law.
+    """
+    refuse_position_limits(path, request)
+    corners = _corners(path.curve, 2 if request.limits.jerk is not None else 1)
+    laws, begin, seconds = [], 0.0, 0.0
+    for stretch in _split(path.curve, corners):
+        law, spent = time_stretch(stretch, Units.of(stretch, request.limits))
+        seconds += spent
+        laws.append(law.shifted(begin))
+        begin = laws[-1].end
+    law = Trajectory.concatenate(laws)
+    times = _reached(law, path.knots)
+    trajectory = path.curve.compose(law)
+    needed = slowdown(trajectory, request, times)
+    factor = max(needed.factor, 1e-300)
+    duration = stretched(factor * trajectory.duration, request.duration)
+    factor = duration / trajectory.duration
+    notes: tuple[Note, ...] = ()
+    if len(corners):
+        notes = (Note("stops_at_corners", f"the path has {len(corners)} corner(s); the motion stops at each"),)
+    return Solution(
+        trajectory.scaled(factor),
+        times * factor,
+        Stats(solver, "solved", law.pieces, seconds),
+        Followed(path.curve, law.scaled(factor)),
+        notes=notes,
+    )
+
+
+def _corners(curve: Trajectory, order: int) -> Array:
+    """Return the interior breaks at which a derivative of order 1 … ``order`` jumps."""
+    if curve.pieces == 1:
+        return np.empty(0)
+    found = curve.extrema(order + 1)
+    jumps = np.zeros(curve.pieces - 1, dtype=bool)
+    for m in range(1, order + 1):
+        jumps |= curve.counted_jumps(m, found.peak(m)).any(axis=1)
+    return np.asarray(curve.breaks[1:-1][jumps])
+
+
+def _split(curve: Trajectory, corners: Array) -> list[Trajectory]:
+    cuts = np.concatenate([[0], np.searchsorted(curve.breaks, corners), [curve.pieces]])
+    return [
+        Trajectory(curve.breaks[a : b + 1], curve.coefficients[:, a:b])
+        for a, b in zip(cuts[:-1], cuts[1:], strict=True)
+    ]
+
+
+def _reached(law: Trajectory, knots: Array) -> Array:
+    """Return when a law reaches the knots, which lie at its breaks' values."""
+    left, right = (x[:, 0] for x in law.ends(0))
+    values = np.append(left, right[-1])
+    index = np.abs(values[None, :] - knots[:, None]).argmin(axis=1)
+    if np.abs(values[index] - knots).max() > 1e-9 * max(float(np.ptp(knots)), 1e-300):
+        raise SolverFailed("timing", "a waypoint is not on the grid")
+    return np.asarray(law.breaks[index])
