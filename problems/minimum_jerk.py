@@ -85,7 +85,7 @@ class MinimumJerk:
 
     def states(self, y: Array) -> tuple[Array, Array]:
         """Return velocities and accelerations at all nodes, (M + 1, D) each, from y (2 (M - 1), D)."""
-        inner = y.reshape(len(self.h) - 1, 2, -1)
+        inner = y.reshape(len(self.h) - 1, 2, self.positions.shape[1])
         velocity = np.concatenate([self.start[:1], inner[:, 0], self.end[:1]])
         acceleration = np.concatenate([self.start[1:], inner[:, 1], self.end[1:]])
         return velocity, acceleration

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.rest_to_rest import StopsAtWaypoints, double_integrator, triple_integrator
+from problems.rest_to_rest import double_integrator, triple_integrator
 
 from ..errors import Infeasible
 from ..limits import QUANTITIES, Boundary, Limit, segment_bounds
 from ..method import Capabilities, Method, Reference
 from ..options import Options
 from ..timing.state_to_state import Segment, time_optimal
-from ..timing.stops import segment_bounds_of, segment_durations
+from ..timing.stops import segment_durations, stops_bound
 from ..trajectory import Trajectory
 from ..types import Bound, Note, PlanRequest, Solution, Stats
 
@@ -116,12 +116,8 @@ def _bound(segments: list[Segment], request: PlanRequest) -> Bound | None:
     v, a = np.stack([s.velocity.upper for s in segments]), np.stack([s.acceleration.upper for s in segments])
     j = np.stack([s.jerk for s in segments])
     limited = np.isfinite(j)
-    shortest = np.where(
-        limited, triple_integrator(move, v, a, np.where(limited, j, 1.0)), double_integrator(move, v, a, a)
-    )
-    least, _ = segment_bounds_of(request)
-    total = 0.0 if request.duration is None else request.duration.min
-    return Bound("method", StopsAtWaypoints(shortest, least, total))
+    jerk_limited = triple_integrator(move, v, a, np.where(limited, j, 1.0))
+    return stops_bound(np.where(limited, jerk_limited, double_integrator(move, v, a, a)), request)
 
 
 RUCKIG = Method(

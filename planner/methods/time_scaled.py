@@ -5,7 +5,7 @@ from pydantic import Field
 
 from ..errors import InvalidRequest
 from ..method import Capabilities, Method, Reference
-from ..paths import CubicSplinePath, PathOptions, build_path, refuse_position_limits
+from ..paths import CubicSplinePath, LinearPath, PathOptions, build_path, refuse_position_limits
 from ..timing.scaling import slowdown, stretched
 from ..trajectory import Trajectory
 from ..types import Followed, Note, PlanRequest, Solution, Stats
@@ -59,24 +59,14 @@ def _exactly(breaks: np.ndarray, curve_breaks: np.ndarray, knots: np.ndarray, ti
 
 
 def capabilities(options: TimeScaledOptions) -> Capabilities:
-    """Return what is honoured; only the clamped spline rests at its ends."""
-    clamped = isinstance(options.path, CubicSplinePath) and options.path.boundary in (None, "clamped")
+    """Return what is honoured; only the clamped spline rests at its ends, and no scaling bounds a corner."""
     spline = isinstance(options.path, CubicSplinePath)
+    clamped = isinstance(options.path, CubicSplinePath) and options.path.boundary in (None, "clamped")
+    honours = {"times", "position", "velocity", "segment_limits", "segment_durations", "duration"}
     return Capabilities(
         "either",
         2 if spline else 0,
-        honours=frozenset(
-            {
-                "times",
-                "position",
-                "velocity",
-                "acceleration",
-                "jerk",
-                "segment_limits",
-                "segment_durations",
-                "duration",
-            }
-        ),
+        honours=frozenset(honours if isinstance(options.path, LinearPath) else honours | {"acceleration", "jerk"}),
         rests=frozenset({"velocity"}) if clamped else frozenset(),
     )
 

@@ -3,15 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.rest_to_rest import StopsAtWaypoints, double_integrator
+from problems.rest_to_rest import double_integrator
 
 from ..curves.linear import linear
 from ..limits import segment_bounds
 from ..method import Capabilities, Method, Reference
 from ..options import Options
-from ..timing.stops import segment_bounds_of, segment_durations
+from ..timing.stops import segment_durations, stops_bound
 from ..trajectory import Trajectory
-from ..types import Bound, Followed, PlanRequest, Solution, Stats
+from ..types import Followed, PlanRequest, Solution, Stats
 
 Array = NDArray[np.float64]
 
@@ -43,9 +43,7 @@ def solve(request: PlanRequest, options: TrapezoidalOptions) -> Solution:
         breaks[-1] = times[i + 1]
     law = Trajectory.from_powers(breaks, np.array(powers).T[:, :, None])
     curve = linear(np.arange(request.count), request.waypoints)
-    least, _ = segment_bounds_of(request)
-    total = 0.0 if request.duration is None else request.duration.min
-    bound = Bound("method", StopsAtWaypoints(shortest[:, None], least, total))
+    bound = stops_bound(shortest[:, None], request)
     return Solution(curve.compose(law), times, Stats("closed_form"), Followed(curve, law), bound)
 
 

@@ -3,8 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from problems.rest_to_rest import StopsAtWaypoints
+
 from ..errors import Infeasible
-from ..types import PlanRequest
+from ..types import Bound, PlanRequest
 from .scaling import stretched
 
 Array = NDArray[np.float64]
@@ -57,3 +59,10 @@ def segment_durations(shortest: Array, request: PlanRequest) -> Array:
         weight = np.where(room, np.maximum(durations, 1e-12 * total), 0.0)
         durations = np.minimum(durations + missing * weight / weight.sum(), most)
     return durations
+
+
+def stops_bound(shortest: Array, request: PlanRequest) -> Bound:
+    """Return the bound for stops at every waypoint, from the joints' own shortest times on each segment (N - 1, D)."""
+    least, _ = segment_bounds_of(request)
+    total = 0.0 if request.duration is None else request.duration.min
+    return Bound("method", StopsAtWaypoints(shortest, least, total))
