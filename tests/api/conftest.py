@@ -1,0 +1,42 @@
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import hypothesis
+import pytest
+from starlette.testclient import TestClient
+
+from api.app import create_app
+from api.errors import KINDS, LARGEST
+
+# A failure prints its seed and how to reproduce it; nothing is kept on disk.
+hypothesis.settings.register_profile("api", deadline=None, database=None, print_blob=True, max_examples=60)
+hypothesis.settings.load_profile("api")
+
+
+@pytest.fixture(scope="session")
+def service() -> Iterator[TestClient]:
+    """The service without a socket; what it does not catch is raised."""
+    with TestClient(create_app()) as client:
+        yield client
+
+
+@pytest.fixture(scope="session")
+def problem() -> Callable[..., dict[str, Any]]:
+    """Check a response to be a proper problem document and return it."""
+
+    def check(response: Any, code: str | None = None) -> dict[str, Any]:
+        assert response.headers["content-type"] == "application/problem+json"
+        assert len(response.content) < LARGEST
+        document: dict[str, Any] = json.loads(response.content, parse_constant=lambda name: pytest.fail(name))
+        assert document["status"] == response.status_code
+        assert document["request_id"] == response.headers["x-request-id"]
+        kind = document["type"].removeprefix("/errors/")
+        assert KINDS[kind].status == response.status_code
+        assert document["title"] == KINDS[kind].title
+        assert document["detail"]
+        if code is not None:
+            assert kind == code, document
+        return document
+
+    return check

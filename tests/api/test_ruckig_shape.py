@@ -1,0 +1,99 @@
+"""POST /v1/trajectories?shape=ruckig: a body with the names of ruckig's InputParameter."""
+
+import pytest
+
+PLAN = "/v1/trajectories"
+BODY = {
+    "degrees_of_freedom": 2,
+    "current_position": [0, 0],
+    "target_position": [1, -2],
+    "max_velocity": [1, 2],
+    "max_acceleration": [3, 3],
+    "max_jerk": [10, 10],
+}
+OURS = {
+    "waypoints": [[0, 0], [1, -2]],
+    "limits": {"velocity": [1, 2], "acceleration": [3, 3], "jerk": [10, 10]},
+}
+
+
+def ask(service, **changes):
+    return service.post(PLAN + "?shape=ruckig", json=BODY | changes)
+
+
+def answer(service, **changes):
+    response = ask(service, **changes)
+    assert response.status_code == 200, response.text[:1000]
+    return response.json()
+
+
+def same(service, changes, ours):
+    """Whether both shapes of the request give the same answer."""
+    return ask(service, **changes).content == service.post(PLAN, json=OURS | ours).content
+
+
+def test_the_answer_is_the_plan_answer(service):
+    found = answer(service)
+    assert found["method"] == "ruckig" and found["certificate"]["holds"]
+    assert [c["quantity"] for c in found["certificate"]["checks"]] == ["velocity", "acceleration", "jerk"]
+    assert same(service, {}, {})
+
+
+@pytest.mark.parametrize(
+    "changes, ours",
+    [
+        ({"current_velocity": [0, 0], "target_acceleration": [0, 0]}, {}),
+        ({"current_velocity": [0.1, 0]}, {"start": {"velocity": [0.1, 0]}}),
+        ({"target_velocity": [0, -0.1]}, {"end": {"velocity": [0, -0.1]}}),
+        ({"intermediate_positions": [[1, 1]]}, {"waypoints": [[0, 0], [1, 1], [1, -2]]}),
+        ({"min_velocity": [-1, -1]}, {"limits": OURS["limits"] | {"velocity": {"lower": [-1, -1], "upper": [1, 2]}}}),
+        ({"minimum_duration": 9}, {"duration": {"min": 9}}),
+        ({"per_section_minimum_duration": [9]}, {"segment_durations": [{"min": 9}]}),
+        ({"per_section_max_velocity": [[0.5, 0.5]]}, {"segment_limits": [{"velocity": [0.5, 0.5]}]}),
+        ({"enabled": [True, True], "control_interface": "position", "synchronization": "time"}, {}),
+        ({"duration_discretization": "continuous", "sampling": None, "include": None}, {}),
+        ({"sampling": {"count": 7}, "include": ["polynomial", "samples"]},) * 2,
+        ({"degrees_of_freedom": None}, {}),
+    ],
+)
+def test_it_says_the_same_as_our_shape(service, changes, ours):
+    assert same(service, changes, ours)
+
+
+def test_without_a_jerk_limit(service):
+    assert answer(service, max_jerk=None)["method"] == "toppra"
+
+
+@pytest.mark.parametrize(
+    "changes, field, code",
+    [
+        ({"current_position": None}, "/current_position", "wrong_type"),
+        ({"degrees_of_freedom": 3}, "/current_position", "shape_mismatch"),
+        ({"target_position": [1]}, "/target_position", "shape_mismatch"),
+        ({"intermediate_positions": [[1]]}, "/intermediate_positions/0", "shape_mismatch"),
+        ({"max_velocity": [0, 1]}, "/max_velocity", "bad_limits"),
+        ({"min_velocity": [1, 1]}, "/max_velocity", "bad_limits"),
+        ({"max_velocity": [1]}, "/max_velocity", "shape_mismatch"),
+        ({"min_acceleration": [-1]}, "/min_acceleration", "shape_mismatch"),
+        ({"current_velocity": [1]}, "/current_velocity", "shape_mismatch"),
+        ({"per_section_max_velocity": [[1, 1], [1, 1]]}, "/per_section_max_velocity", "shape_mismatch"),
+        ({"per_section_max_jerk": [[-1, 1]]}, "/per_section_max_jerk/0", "bad_limits"),
+        ({"per_section_minimum_duration": []}, "/per_section_minimum_duration", "shape_mismatch"),
+        ({"minimum_duration": -1}, "/minimum_duration", "out_of_range"),
+        ({"enabled": [True, False]}, "/enabled/1", "out_of_range"),
+        ({"control_interface": "velocity"}, "/control_interface", "out_of_range"),
+        ({"synchronization": "none"}, "/synchronization", "out_of_range"),
+        ({"duration_discretization": "discrete"}, "/duration_discretization", "out_of_range"),
+        ({"interrupt_calculation_duration": 5}, "/interrupt_calculation_duration", "unknown_field"),
+        ({"waypoints": [[0]]}, "/waypoints", "unknown_field"),
+        ({"max_acceleration": None, "max_jerk": None}, "/max_acceleration", "missing"),
+    ],
+)
+def test_errors_point_to_the_callers_fields(service, problem, changes, field, code):
+    document = problem(ask(service, **changes), "invalid_request")
+    assert (field, code) in [(e["field"], e["code"]) for e in document["errors"]], document
+
+
+def test_what_no_method_honours_is_refused_by_name(service, problem):
+    document = problem(ask(service, max_position=[5, 5], min_position=[-5, -5]), "unsupported")
+    assert "position" in document["what"]
