@@ -218,8 +218,8 @@ class Trajectory:
         jumps = np.abs(self.jumps(order))
         if order == 0:
             return np.asarray(jumps > JUMP * span)
-        size = np.abs(self.coefficients[:-1]).max(axis=0, initial=0.0)
-        rounding = 1e3 * np.finfo(float).eps * size / np.diff(self.breaks)[:, None] ** order
+        size = 1e3 * np.abs(self.coefficients[:-1]).max(axis=0, initial=0.0) + 64 * np.abs(self.coefficients[-1])
+        rounding = np.finfo(float).eps * size / np.diff(self.breaks)[:, None] ** order
         return np.asarray(jumps > JUMP * peak + np.maximum(rounding[1:], rounding[:-1]))
 
     def extrema(self, orders: int = 4) -> Extrema:

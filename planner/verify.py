@@ -260,30 +260,37 @@ def _path_deviation(trajectory: Trajectory, path: Followed) -> float:
     return float(np.linalg.norm(trajectory(times) - curve(s), axis=1).max())
 
 
+#: Gauss-Legendre rules on [0, 1]: (nodes, weights), a coarse and a fine one.
+_RULES = [(0.5 + 0.5 * x, 0.5 * w) for x, w in map(np.polynomial.legendre.leggauss, (8, 16))]
+
+
 def path_length(trajectory: Trajectory) -> float:
     """Return the integral of the Euclidean norm of the velocity, to about 1e-10 relative.
 
     Gauss-Legendre on each piece, halving those whose 8- and 16-point values differ (the norm has kinks at rests).
     """
-    coarse, fine = np.polynomial.legendre.leggauss(8), np.polynomial.legendre.leggauss(16)
-    left, right = trajectory.breaks[:-1], trajectory.breaks[1:]
+    n = trajectory.degree
+    if n == 0:
+        return 0.0
+    slopes = trajectory.coefficients[:-1] * np.arange(n, 0, -1.0)[:, None, None]  # d/du, highest power first
+    piece, left, width = np.arange(trajectory.pieces), np.zeros(trajectory.pieces), np.ones(trajectory.pieces)
     total = 0.0
     for _ in range(48):
-        a, b = (_speed_integrals(trajectory, left, right, *rule) for rule in (coarse, fine))
+        a, b = (_speed_integrals(slopes[:, piece], left, width, *rule) for rule in _RULES)
         scale = max(total + float(b.sum()), 1e-300)
         rough = np.abs(a - b) > 1e-11 * scale / np.sqrt(len(a))
         total += float(b[~rough].sum())
         if not rough.any():
             return total
-        left, right = left[rough], right[rough]
-        middle = 0.5 * (left + right)
-        left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
+        piece, half = np.repeat(piece[rough], 2), 0.5 * width[rough]
+        left = np.stack([left[rough], left[rough] + half], axis=1).reshape(-1)
+        width = np.repeat(half, 2)
     return total + float(b[rough].sum())
 
 
-def _speed_integrals(trajectory: Trajectory, left: Array, right: Array, nodes: Array, weights: Array) -> Array:
-    half = 0.5 * (right - left)
-    times = (0.5 * (left + right))[:, None] + half[:, None] * nodes
-    times = np.clip(times, trajectory.start, trajectory.end)
-    speed = np.linalg.norm(trajectory(times.reshape(-1), 1), axis=1).reshape(times.shape)
-    return np.asarray(half * (speed @ weights))
+def _speed_integrals(slopes: Array, left: Array, width: Array, nodes: Array, weights: Array) -> Array:
+    u = (left[:, None] + width[:, None] * nodes)[:, :, None]
+    value = np.broadcast_to(slopes[0][:, None, :], (len(left), len(nodes), slopes.shape[2]))
+    for c in slopes[1:]:
+        value = value * u + c[:, None, :]
+    return np.asarray(width * (np.sqrt(np.einsum("knd,knd->kn", value, value)) @ weights))

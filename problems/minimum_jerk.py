@@ -12,6 +12,7 @@ definite, the same for every joint. A limit on a derivative at one instant is on
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import factorial
 
 import numpy as np
@@ -45,14 +46,16 @@ class MinimumJerk:
         one = slice(joint, joint + 1)
         return MinimumJerk(self.h, self.positions[:, one], self.start[:, one], self.end[:, one])
 
+    @cached_property
     def _elements(self) -> Array:
         """Return each gap's cost matrix in (d, v0, a0, v1, a1), (M, 5, 5)."""
         scale = np.stack([np.ones_like(self.h), self.h, self.h**2, self.h, self.h**2], axis=1)
         return np.asarray(scale[:, :, None] * COST * scale[:, None, :] / self.h[:, None, None] ** 5)
 
+    @cached_property
     def bands(self) -> Array:
         """Return the Hessian over the interior node states in LAPACK's upper banded form, (4, 2 (M - 1))."""
-        k = self._elements()
+        k = self._elements
         inner = len(self.h) - 1
         bands = np.zeros((4, 2 * inner))
         diagonal = 2.0 * (k[:-1, 3:, 3:] + k[1:, 1:3, 1:3])
@@ -62,9 +65,10 @@ class MinimumJerk:
         bands[2, 2::2], bands[1, 3::2] = across[:, 1, 0], across[:, 1, 1]
         return bands
 
+    @cached_property
     def gradients(self) -> Array:
         """Return the linear terms, (2 (M - 1), D)."""
-        k, step = self._elements(), np.diff(self.positions, axis=0)
+        k, step = self._elements, np.diff(self.positions, axis=0)
         left, right = k[:-1, 3:, 0, None] * step[:-1, None, :], k[1:, 1:3, 0, None] * step[1:, None, :]
         g = 2.0 * (left + right)
         if len(g):
@@ -72,9 +76,10 @@ class MinimumJerk:
             g[-1] += 2.0 * k[-1, 1:3, 3:] @ self.end
         return np.asarray(g.reshape(-1, self.positions.shape[1]))
 
+    @cached_property
     def constants(self) -> Array:
         """Return the constant terms, (D,)."""
-        k, step = self._elements(), np.diff(self.positions, axis=0)
+        k, step = self._elements, np.diff(self.positions, axis=0)
         total = (k[:, 0, 0, None] * step**2).sum(axis=0)
         for gap, index, state in ((0, slice(1, 3), self.start), (-1, slice(3, 5), self.end)):
             total += 2.0 * step[gap] * (k[gap, 0, index] @ state)
@@ -116,4 +121,4 @@ class MinimumJerk:
         n = 2 * (len(self.h) - 1)
         rows = csr_matrix((0, n)) if rows is None else rows
         upper = np.zeros(0) if upper is None else upper
-        return BandedQP(self.bands(), self.gradients()[:, joint], float(self.constants()[joint]), rows, upper)
+        return BandedQP(self.bands, self.gradients[:, joint], float(self.constants[joint]), rows, upper)

@@ -55,7 +55,8 @@ class PathTiming:
         x = ca.SX.sym("x", 2 * count if self.jerk else count)
         va = x[:count]
         root = ca.sqrt(va)
-        low_a, high_a = 1e-9 * float(a.max()) * np.minimum(a / a.max(), 1.0), self.fastest()
+        low_a, high_a = 1e-9 * a, self.fastest()
+        high_a = np.where(high_a > 1e6 * a.max(), np.inf, high_a)  # solvers relax bounds in proportion: huge ones hurt
         start = np.clip(a, 2.0 * low_a, 0.98 * high_a)
         if self.jerk:
             vb = x[count:]

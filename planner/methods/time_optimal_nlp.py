@@ -1,11 +1,13 @@
 """Method ``time_optimal_nlp``."""
 
+from dataclasses import replace
+
 from pydantic import Field
 
 from ..deadline import Deadline
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
-from ..timing.following import Units, follow
+from ..timing.following import Timed, Units, follow
 from ..timing.grids import initial_grid, refined
 from ..timing.nlp_law import nlp_law
 from ..timing.scaling import local_factors
@@ -22,7 +24,10 @@ class TimeOptimalNlpOptions(PathOptions):
     """Options of the time-optimal nonlinear program."""
 
     stations: int | None = Field(
-        default=None, ge=10, le=2000, description="fixed number of stations (default: about 100, refined where needed)"
+        default=None,
+        ge=10,
+        le=2000,
+        description="fixed number of stations (default: about 200, with jerk 100, refined)",
     )
 
 
@@ -31,17 +36,18 @@ def solve(request: PlanRequest, options: TimeOptimalNlpOptions) -> Solution:
     deadline = Deadline(request.timeout)
     path = build_path(options.path, request.waypoints)
 
-    def timed(stretch: Trajectory, units: Units) -> tuple[Trajectory, float]:
-        grid = initial_grid(stretch, options.stations or max(100, 12 * stretch.pieces))
-        law, spent = nlp_law(stretch, request.limits, units, grid, deadline.left())
+    def timed(stretch: Trajectory, units: Units) -> Timed:
+        first = 200 if request.limits.jerk is None else 100
+        grid = initial_grid(stretch, options.stations or max(first, 12 * stretch.pieces))
+        best = nlp_law(stretch, request.limits, units, grid, deadline.left())
         for _ in range(0 if options.stations else ROUNDS - 1):
-            factors = local_factors(stretch.compose(law), request.limits)
+            factors = local_factors(stretch.compose(best.law), request.limits)
             if factors.max() <= GOOD or len(grid) > MOST or len(factors) != len(grid) - 1:
                 break
             grid = refined(grid, factors > 1.0 + 0.25 * (GOOD - 1.0))
-            law, seconds = nlp_law(stretch, request.limits, units, grid, deadline.left())
-            spent += seconds
-        return law, spent
+            again = nlp_law(stretch, request.limits, units, grid, deadline.left())
+            best = replace(again, seconds=best.seconds + again.seconds)
+        return best
 
     return follow(path, request, timed, "ipopt")
 

@@ -9,7 +9,7 @@ from ..deadline import Deadline
 from ..errors import SolverFailed
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
-from ..timing.following import Units, follow
+from ..timing.following import Timed, Units, follow
 from ..timing.grids import constant_acceleration_law, initial_grid, refined
 from ..timing.scaling import local_factors
 from ..timing.toppra_speeds import toppra_speeds
@@ -38,7 +38,7 @@ def solve(request: PlanRequest, options: ToppraOptions) -> Solution:
     deadline = Deadline(request.timeout)
     path = build_path(options.path, request.waypoints)
 
-    def timed(stretch: Trajectory, units: Units) -> tuple[Trajectory, float]:
+    def timed(stretch: Trajectory, units: Units) -> Timed:
         grid = initial_grid(stretch, options.stations or max(300, 20 * stretch.pieces))
         law, failure, spent = None, None, 0.0
         for _ in range(1 if options.stations else ROUNDS):
@@ -58,7 +58,7 @@ def solve(request: PlanRequest, options: ToppraOptions) -> Solution:
             grid = refined(grid, factors > 1.0 + 0.25 * (GOOD - 1.0))
         if law is None:
             raise failure or SolverFailed("toppra", "no parameterisation found")
-        return law, spent
+        return Timed(law, spent)
 
     return follow(path, request, timed, "toppra")
 

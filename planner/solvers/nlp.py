@@ -42,7 +42,9 @@ def solve_nlp(problem: dict[str, Any], backend: Backend, time_limit: float | Non
 
     settings = {f"{backend.name}.{k}": v for k, v in backend.settings(ASKED, time_limit).items()}
     expressions = {k: problem[k] for k in ("x", "f", "g")}
-    solver = ca.nlpsol("solver", backend.name, expressions, {**settings, "print_time": False})
+    solver = ca.nlpsol(
+        "solver", backend.name, expressions, {**settings, "print_time": False, "show_eval_warnings": False}
+    )
     constraints = ca.Function("g", [problem["x"]], [problem["g"]])
     started = time.perf_counter()
     answer = solver(**{k: problem[k] for k in ("x0", "lbx", "ubx", "lbg", "ubg")})

@@ -36,12 +36,25 @@ class Units:
         length = found.high[0].max(axis=0) - found.low[0].min(axis=0)
         moving = length > 1e-14 * max(float(length.max()), 1e-300)
         parameter = stretch.duration / stretch.pieces
-        rate = float(local_factors(stretch, replace(limits, jerk=None)).max())
-        return cls(np.where(moving, length, 1.0), parameter, rate * parameter if rate > 0 else 1.0, moving)
+        second = float(local_factors(stretch, replace(limits, jerk=None)).max()) * parameter
+        gap = stretch.extrema(2).peak(1) * parameter
+        for order in (2, 3):  # a straight line has no curvature to tell how long a start from rest takes
+            limit = limits.bounds(order, stretch.dims)
+            second = max(second, float((gap / np.minimum(limit.upper, -limit.lower)).max()) ** (1.0 / order))
+        return cls(np.where(moving, length, 1.0), parameter, second if second > 0 else 1.0, moving)
 
 
-#: Times one smooth stretch of path from rest to rest: a law s(t) that starts at time 0, and the seconds in the solver.
-TimeStretch = Callable[[Trajectory, Units], tuple[Trajectory, float]]
+@dataclass(frozen=True, eq=False)
+class Timed:
+    """A law s(t) from rest to rest that starts at time 0, the seconds spent in the solver, and what it had to say."""
+
+    law: Trajectory
+    seconds: float
+    notes: tuple[Note, ...] = ()
+
+
+#: Times one smooth stretch of path.
+TimeStretch = Callable[[Trajectory, Units], Timed]
 
 
 def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: str) -> Solution:
@@ -59,12 +72,13 @@ def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: 
     """
     refuse_position_limits(path, request)
     corners = _corners(path.curve, 2 if request.limits.jerk is not None else 1)
-    laws, begin, seconds = [], 0.0, 0.0
+    laws: list[Trajectory] = []
+    seconds, notes = 0.0, dict[Note, None]()
     for stretch in _split(path.curve, corners):
-        law, spent = time_stretch(stretch, Units.of(stretch, request.limits))
-        seconds += spent
-        laws.append(law.shifted(begin))
-        begin = laws[-1].end
+        timed = time_stretch(stretch, Units.of(stretch, request.limits))
+        laws.append(timed.law.shifted(laws[-1].end if laws else 0.0))
+        seconds += timed.seconds
+        notes.update(dict.fromkeys(timed.notes))
     law = Trajectory.concatenate(laws)
     times = _reached(law, path.knots)
     trajectory = path.curve.compose(law)
@@ -72,15 +86,14 @@ def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: 
     factor = max(needed.factor, 1e-300)
     duration = stretched(factor * trajectory.duration, request.duration)
     factor = duration / trajectory.duration
-    notes: tuple[Note, ...] = ()
     if len(corners):
-        notes = (Note("stops_at_corners", f"the path has {len(corners)} corner(s); the motion stops at each"),)
+        notes[Note("stops_at_corners", f"the path has {len(corners)} corner(s); the motion stops at each")] = None
     return Solution(
         trajectory.scaled(factor),
         times * factor,
         Stats(solver, "solved", law.pieces, seconds),
         Followed(path.curve, law.scaled(factor)),
-        notes=notes,
+        notes=tuple(notes),
     )
 
 

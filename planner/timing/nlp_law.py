@@ -9,17 +9,16 @@ from ..limits import Limits
 from ..solvers import select
 from ..solvers.nlp import solve_nlp
 from ..trajectory import Trajectory
-from .following import Units
+from ..types import Note
+from .following import Timed, Units
 from .grids import constant_acceleration_law
 from .scaling import local_factors
 
 Array = NDArray[np.float64]
 
 
-def nlp_law(
-    stretch: Trajectory, limits: Limits, units: Units, grid: Array, time_limit: float | None
-) -> tuple[Trajectory, float]:
-    """Return the time-optimal law on the stations, and the seconds in the solver.
+def nlp_law(stretch: Trajectory, limits: Limits, units: Units, grid: Array, time_limit: float | None) -> Timed:
+    """Return the time-optimal law on the stations; where the solver stopped short of an optimum it says so.
 
     Raises
     ------
@@ -30,11 +29,15 @@ def nlp_law(
     answer = solve_nlp(problem.to_casadi(*guess), select("nlp")[0], time_limit)
     speed, acceleration, steps = problem.read(answer.x)
     speed, acceleration = speed * units.parameter / units.second, acceleration * units.parameter / units.second**2
+    notes: tuple[Note, ...] = ()
+    if answer.status not in ("Solve_Succeeded", "Solved_To_Acceptable_Level"):
+        notes = (Note("not_optimal", f"IPOPT stopped at a feasible law, not at an optimum: {answer.status}"),)
     if not problem.jerk:
-        return constant_acceleration_law(grid, speed), answer.seconds
+        return Timed(constant_acceleration_law(grid, speed), answer.seconds, notes)
     # sdot² quadratic in s is no polynomial in time: quintics through the stations' states are, and are checked exactly
     times = np.concatenate([[0.0], np.cumsum(steps)]) * units.second
-    return Trajectory.from_hermite(times, grid[:, None], speed[:, None], acceleration[:, None]), answer.seconds
+    law = Trajectory.from_hermite(times, grid[:, None], speed[:, None], acceleration[:, None])
+    return Timed(law, answer.seconds, notes)
 
 
 def _statement(stretch: Trajectory, limits: Limits, units: Units, grid: Array) -> PathTiming:

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 #: In scaled units every move takes about one, so limits above such a cap hardly bind; where ruckig fails with the first
 #: cap (it takes limits up to 1e9, but mixes of scales trouble it) the next is tried.
-CAPS = (1e8, 1e6, 1e4)
+CAPS = (9e8, 1e8, 1e6, 1e4)
 
 
 @dataclass(frozen=True, eq=False)

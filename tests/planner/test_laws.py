@@ -1,0 +1,135 @@
+"""Laws that hold for every method, on random problems; the seed is the whole recipe."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner import METHODS, PlanRequest, plan
+from planner.limits import QUANTITIES
+
+SEEDS = st.integers(0, 2**32 - 1)
+TIMED = ("linear", "cubic_spline", "minimum_jerk")
+CHOSEN = ("trapezoidal", "ruckig", "time_scaled", "toppra")
+assert set(TIMED) | set(CHOSEN) | {"time_optimal_nlp"} == set(METHODS)
+
+
+def make(method, rng, jerk=True):
+    """Return waypoints, times or limits that the method honours."""
+    n, dims = int(rng.integers(2, 7)), int(rng.integers(1, 5))
+    points = rng.uniform(-2, 2, (n, dims))
+    if method in TIMED:
+        return points, {"times": np.cumsum(rng.uniform(0.2, 2, n))}
+    limits = {"velocity": rng.uniform(0.5, 2, dims), "acceleration": rng.uniform(0.5, 5, dims)}
+    if jerk and method in ("ruckig", "time_scaled") and rng.random() < 0.7:
+        limits["jerk"] = rng.uniform(5, 50, dims)
+    return points, {"limits": limits}
+
+
+@pytest.mark.parametrize("method", [*TIMED, *CHOSEN])
+@given(SEEDS)
+def test_waypoints_continuity_and_limits(method, seed):
+    rng = np.random.default_rng(seed)
+    points, given_ = make(method, rng)
+    done = plan(PlanRequest.of(points, **given_), method)
+    t, span = done.trajectory, max(1.0, float(np.ptp(points, axis=0).max()))
+    assert np.abs(t(np.clip(done.waypoint_times, t.start, t.end)) - points).max() <= 1e-9 * span
+    row = METHODS[method]
+    for order in range(row.capabilities(row.options()).continuity + 1):
+        peak = np.maximum(t.extrema(order + 1).peak(order), 1.0)
+        assert (np.abs(t.jumps(order)) <= 1e-7 * peak).all()
+    times = np.linspace(t.start, t.end, 5001)
+    for order, quantity in enumerate(QUANTITIES):
+        if quantity in given_.get("limits", {}):
+            bound = given_["limits"][quantity]
+            assert (np.abs(t(times, order)) <= bound * (1 + 1e-9)).all()
+            assert (t.extrema(4).peak(order) <= bound * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("method", TIMED)
+@given(SEEDS)
+def test_time_scaling_of_times(method, seed):
+    rng = np.random.default_rng(seed)
+    points, given_ = make(method, rng)
+    factor = float(rng.uniform(0.3, 3))
+    a = plan(PlanRequest.of(points, **given_), method).trajectory
+    b = plan(PlanRequest.of(points, times=given_["times"] * factor), method).trajectory
+    at = np.linspace(0, 1, 40)
+    for order in range(3):
+        fast = a(np.clip(a.start + at * a.duration, a.start, a.end), order)
+        slow = b(np.clip(b.start + at * b.duration, b.start, b.end), order) * factor**order
+        assert np.abs(fast - slow).max() <= 1e-6 * (1 + np.abs(fast).max())
+
+
+@pytest.mark.parametrize("method", CHOSEN)
+@given(SEEDS)
+def test_time_scaling_of_limits(method, seed):
+    """Limits v / a, a / a², j / a³ make the same motion a times as long."""
+    rng = np.random.default_rng(seed)
+    points, given_ = make(method, rng)
+    factor = float(rng.uniform(0.3, 3))
+    orders = {"velocity": 1, "acceleration": 2, "jerk": 3}
+    slow = {q: x / factor ** orders[q] for q, x in given_["limits"].items()}
+    a = plan(PlanRequest.of(points, **given_), method).trajectory
+    b = plan(PlanRequest.of(points, limits=slow), method).trajectory
+    assert b.duration == pytest.approx(a.duration * factor, rel=1e-6)
+
+
+@pytest.mark.parametrize("method", [*TIMED, *CHOSEN])
+@given(SEEDS)
+def test_reversal_mirrors(method, seed):
+    rng = np.random.default_rng(seed)
+    points, given_ = make(method, rng)
+    a = plan(PlanRequest.of(points, **given_), method).trajectory
+    if "times" in given_:
+        given_ = {"times": -given_["times"][::-1]}
+    b = plan(PlanRequest.of(points[::-1], **given_), method).trajectory
+    tolerance = 2e-3 if method == "toppra" else 1e-9  # one pass runs forward, the other backward, on a refined grid
+    assert b.duration == pytest.approx(a.duration, rel=tolerance)
+    if method != "toppra":
+        at = np.linspace(0, 1, 50)
+        there = a(np.clip(a.start + at * a.duration, a.start, a.end))
+        back = b(np.clip(b.end - at * b.duration, b.start, b.end))
+        # on a shared limit several time-optimal profiles may exist: only positions on the way are compared loosely
+        assert np.abs(there - back).max() <= (0.5 if method == "ruckig" else 1e-6) * (1 + np.abs(there).max())
+
+
+@pytest.mark.parametrize("method", [*TIMED, *CHOSEN])
+@given(SEEDS)
+def test_joint_permutation_permutes(method, seed):
+    rng = np.random.default_rng(seed)
+    points, given_ = make(method, rng)
+    order = rng.permutation(points.shape[1])
+    a = plan(PlanRequest.of(points, **given_), method).trajectory
+    if "limits" in given_:
+        given_ = {"limits": {q: x[order] for q, x in given_["limits"].items()}}
+    b = plan(PlanRequest.of(points[:, order], **given_), method).trajectory
+    assert b.duration == pytest.approx(a.duration, rel=1e-9)
+    at = np.linspace(0, 1, 50)
+    x, y = (t(np.clip(t.start + at * t.duration, t.start, t.end)) for t in (a, b))
+    assert np.abs(x[:, order] - y).max() <= 1e-6 * (1 + np.abs(x).max())
+
+
+@pytest.mark.parametrize("method", ["linear", "minimum_jerk"])
+@given(SEEDS)
+def test_a_waypoint_added_on_the_curve_changes_nothing(method, seed):
+    rng = np.random.default_rng(seed)
+    points, given_ = make(method, rng)
+    a = plan(PlanRequest.of(points, **given_), method).trajectory
+    extra = given_["times"][0] + float(rng.uniform(0.2, 0.8)) * (given_["times"][1] - given_["times"][0])
+    times = np.insert(given_["times"], 1, extra)
+    b = plan(PlanRequest.of(np.insert(points, 1, a(extra), axis=0), times=times), method).trajectory
+    at = np.linspace(a.start, a.end, 60)
+    assert np.abs(a(at) - b(at)).max() <= 1e-8 * (1 + np.abs(a(at)).max())
+
+
+@pytest.mark.parametrize("method", ["linear", "cubic_spline", "minimum_jerk"])
+@given(SEEDS)
+def test_affine_maps_of_points_are_affine_maps_of_curves(method, seed):
+    rng = np.random.default_rng(seed)
+    points, given_ = make(method, rng)
+    matrix, offset = rng.normal(size=(points.shape[1], 3)), rng.normal(size=3)
+    a = plan(PlanRequest.of(points, **given_), method).trajectory
+    b = plan(PlanRequest.of(points @ matrix + offset, **given_), method).trajectory
+    at = np.linspace(a.start, a.end, 60)
+    assert np.abs(a(at) @ matrix + offset - b(at)).max() <= 1e-9 * (1 + np.abs(b(at)).max())
