@@ -2,16 +2,11 @@ import json
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import hypothesis
 import pytest
 from starlette.testclient import TestClient
 
 from api.app import create_app
 from api.errors import KINDS, LARGEST
-
-# A failure prints its seed and how to reproduce it; nothing is kept on disk.
-hypothesis.settings.register_profile("api", deadline=None, database=None, print_blob=True, max_examples=60)
-hypothesis.settings.load_profile("api")
 
 
 @pytest.fixture(scope="session")

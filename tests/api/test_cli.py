@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import socket
 import sys
 
 import pytest
@@ -147,3 +148,20 @@ def test_a_bug_is_one_line_too(run, file, monkeypatch):
 
     monkeypatch.setattr("api.__main__.answer_plan", broken)
     assert "boom" in run("plan", file(GOOD), code=1)
+
+
+def test_serve_says_why_it_cannot(run, capsys):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        assert f"127.0.0.1:{port}: Address already in use" in run("serve", "--port", port, code=1)
+    assert "no.such.host.invalid" in run("serve", "--host", "no.such.host.invalid", code=1)
+    for port in ("99999", "-1", "http"):
+        assert main(["serve", f"--port={port}"]) == 2
+    capsys.readouterr()
+
+
+def test_serve_reads_its_settings(run, monkeypatch):
+    monkeypatch.setenv("WAYWRIGHT_JOINTS", "65")
+    assert "WAYWRIGHT_JOINTS" in run("serve", code=2)

@@ -1,0 +1,164 @@
+"""The OpenAPI 3.1 document: one table of operations, and the models of bodies and answers as components."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+
+from planner import CASES
+
+from . import answers as a
+from .encode import CSV, FORMATS, JSON, ROS2
+from .errors import KINDS, MEDIA_TYPE
+from .ruckig_shape import RuckigBody
+from .schemas import CertifyBody, CompareBody, PlanBody
+
+_POST_ERRORS = (
+    "invalid_request",
+    "unknown_method",
+    "unsupported",
+    "infeasible",
+    "not_acceptable",
+    "too_large",
+    "unsupported_media_type",
+    "timeout",
+    "solver_failed",
+    "not_verified",
+)
+
+
+@dataclass(frozen=True)
+class Operation:
+    """What the document says about one operation besides its docstring."""
+
+    tag: str
+    reply: type[BaseModel]
+    many: bool = False
+    body: tuple[type[BaseModel], ...] = ()
+    formats: tuple[str, ...] = (JSON,)
+    errors: tuple[str, ...] = ("not_acceptable",)
+    parameters: tuple[dict[str, Any], ...] = ()
+    example: Any = None
+
+
+def _parameter(name: str, where: str, description: str, **schema: Any) -> dict[str, Any]:
+    return {
+        "name": name,
+        "in": where,
+        "required": where == "path",
+        "description": description,
+        "schema": {"type": "string", **schema},
+    }
+
+
+_EXAMPLE = {**CASES["contract_example"].request, "method": "auto", "options": {}}
+_POLYNOMIAL = {"breaks": [0, 1], "coefficients": [[[0]], [[0]], [[3]], [[-2]]]}
+
+OPERATIONS: dict[str, Operation] = {
+    "plan": Operation(
+        "planning",
+        a.PlanReply,
+        body=(PlanBody, RuckigBody),
+        formats=FORMATS,
+        errors=_POST_ERRORS,
+        parameters=(_parameter("shape", "query", "ruckig: the body has the names of InputParameter", enum=["ruckig"]),),
+        example=_EXAMPLE,
+    ),
+    "compare": Operation(
+        "planning",
+        a.ComparisonReply,
+        body=(CompareBody,),
+        errors=_POST_ERRORS,
+        example={**CASES["two_joint_times"].request, "methods": ["linear", {"method": "minimum_jerk", "options": {}}]},
+    ),
+    "certify": Operation(
+        "planning",
+        a.CertifyReply,
+        body=(CertifyBody,),
+        errors=_POST_ERRORS,
+        example={"trajectory": {"polynomial": _POLYNOMIAL}, "limits": {"velocity": 2}},
+    ),
+    "methods": Operation("discovery", a.MethodReply, many=True),
+    "method": Operation(
+        "discovery",
+        a.MethodReply,
+        errors=("unknown_method", "not_acceptable"),
+        parameters=(_parameter("id", "path", "The method's id"),),
+    ),
+    "cases": Operation("discovery", a.CaseReply, many=True),
+    "limits": Operation("discovery", a.LimitsReply),
+    "version": Operation("discovery", a.VersionReply),
+    "healthz": Operation("health", a.StatusReply, errors=()),
+    "readyz": Operation("health", a.StatusReply, errors=("overloaded",)),
+    "explain": Operation(
+        "discovery",
+        a.ExplanationReply,
+        formats=(JSON, "text/markdown"),
+        errors=("not_found", "not_acceptable"),
+        parameters=(_parameter("code", "path", "The last part of a problem's type", enum=list(KINDS)),),
+    ),
+}
+
+_TEXTS = {
+    CSV: "Header `time,position_1,…,velocity_1,…`, a row per sample",
+    ROS2: "A trajectory_msgs/JointTrajectory",
+    "text/markdown": "The explanation as text",
+}
+
+#: Echoed on every answer.
+_ID_HEADER = {"X-Request-ID": {"description": "The id sent, or one made", "schema": {"type": "string"}}}
+
+
+def operation(name: str) -> dict[str, Any]:
+    """Return the arguments of the route's decorator."""
+    op = OPERATIONS[name]
+    extra: dict[str, Any] = {"parameters": [*op.parameters, _parameter("X-Request-ID", "header", "Echoed")]}
+    if op.body:
+        refs = [{"$ref": _ref(model)} for model in op.body]
+        schema = refs[0] if len(refs) == 1 else {"anyOf": refs}
+        extra["requestBody"] = {"required": True, "content": {JSON: {"schema": schema, "example": op.example}}}
+    return {
+        "operation_id": name,
+        "tags": [op.tag],
+        "response_model": None,
+        "responses": _responses(op),
+        "openapi_extra": extra,
+    }
+
+
+def _ref(model: type[BaseModel]) -> str:
+    return f"#/components/schemas/{model.__name__}"
+
+
+def _responses(op: Operation) -> dict[int | str, dict[str, Any]]:
+    one: dict[str, Any] = {"$ref": _ref(op.reply)}
+    content: dict[str, Any] = {JSON: {"schema": {"type": "array", "items": one} if op.many else one}}
+    for media_type in op.formats:
+        if media_type == ROS2:
+            content[media_type] = {"schema": {"type": "object", "description": _TEXTS[media_type]}}
+        elif media_type != JSON:
+            content[media_type] = {"schema": {"type": "string", "description": _TEXTS[media_type]}}
+    headers: dict[str, Any] = dict(_ID_HEADER)
+    if op.body and ROS2 in op.formats:
+        timing = "Times of validate, pose, solve, verify and encode, ms"
+        headers["Server-Timing"] = {"description": timing, "schema": {"type": "string"}}
+    responses: dict[int | str, dict[str, Any]] = {
+        200: {"description": (op.reply.__doc__ or "").splitlines()[0], "content": content, "headers": headers}
+    }
+    codes = [*op.errors, "internal"] if op.errors else []
+    for status in sorted({KINDS[code].status for code in codes}):
+        titles = [f"`{code}`: {KINDS[code].title}" for code in codes if KINDS[code].status == status]
+        problem = {MEDIA_TYPE: {"schema": {"$ref": _ref(a.Problem)}}}
+        responses[status] = {"description": "; ".join(titles), "content": problem, "headers": dict(_ID_HEADER)}
+    return responses
+
+
+def components() -> dict[str, Any]:
+    """Return the schemas of all bodies and answers, by name."""
+    bodies = {model for op in OPERATIONS.values() for model in op.body}
+    replies = {op.reply for op in OPERATIONS.values()} | {a.Problem}
+    inputs = [(model, "validation") for model in sorted(bodies | replies, key=lambda m: m.__name__)]
+    _, document = models_json_schema(inputs, ref_template="#/components/schemas/{model}")  # type: ignore[arg-type]
+    schemas: dict[str, Any] = document["$defs"]
+    return schemas

@@ -1,0 +1,112 @@
+"""From bytes to a checked body, and from a body to the planner's request. Knows no HTTP."""
+
+from dataclasses import fields
+from typing import Any, TypeVar
+
+import jiter
+from pydantic import BaseModel, ValidationError
+
+from planner import FieldError, InvalidRequest, PlanRequest, Sampling, TooLarge, invalid, pointer, sample_count
+
+from .schemas import MotionBody
+from .settings import Caps
+
+Model = TypeVar("Model", bound=BaseModel)
+
+#: Fields of a motion body that are read on their own.
+_OURS = {"waypoints", "sampling", "include"}
+
+
+def decode(raw: bytes) -> Any:
+    """Return the JSON value; ``NaN`` and numbers beyond floats come through, so that their field can be named.
+
+    Raises
+    ------
+    InvalidRequest
+        ``not_json``: not JSON, not UTF-8, nested too deeply, or with a key twice in an object.
+    """
+    try:
+        return jiter.from_json(raw, allow_inf_nan=True, catch_duplicate_keys=True)
+    except ValueError as error:
+        raise InvalidRequest.of("", "not_json", f"the body is not JSON: {error}"[:300]) from None
+
+
+def parse(model: type[Model], value: Any) -> Model:
+    """Return the value as a body.
+
+    Raises
+    ------
+    InvalidRequest
+        With pointers to what is missing, unknown, of the wrong type or out of range.
+    """
+    if isinstance(value, dict):
+        unknown = [k for k in value if k not in model.model_fields]
+        if len(unknown) > InvalidRequest.shown:  # thousands of them must cost nothing
+            shown = unknown[: InvalidRequest.shown]
+            raise InvalidRequest(
+                [FieldError(pointer((k[:60],)), "unknown_field", "there is no such field") for k in shown], len(unknown)
+            )
+    try:
+        return model.model_validate(value)
+    except ValidationError as error:
+        raise invalid(error) from None
+
+
+def refuse_oversize(waypoints: list[list[float]], caps: Caps) -> None:
+    """Refuse more waypoints or joints than the caps allow, before anything is built from them."""
+    refuse_above(len(waypoints), caps.waypoints, "waypoints")
+    refuse_above(len(waypoints[0]) if waypoints else 0, caps.joints, "joints")
+
+
+def refuse_above(count: int, most: int, what: str) -> None:
+    """Raise TooLarge if there are more than ``most``."""
+    if count > most:
+        raise TooLarge(what, most, f"{count:,} were sent; the library itself has no such cap")
+
+
+def included(body: MotionBody) -> tuple[str, ...]:
+    """Return what the answer is to hold, in one order."""
+    asked = {"samples"} if body.include is None else set(body.include)
+    return tuple(name for name in ("samples", "polynomial", "bound") if name in asked)
+
+
+def to_request(body: MotionBody, caps: Caps, share: int = 1) -> tuple[PlanRequest, Sampling]:
+    """Return the planner's request and where to sample.
+
+    Parameters
+    ----------
+    share : int
+        How many answers share the cap on samples.
+
+    Raises
+    ------
+    InvalidRequest, TooLarge
+    """
+    refuse_oversize(body.waypoints, caps)
+    if body.timeout is not None and body.timeout > caps.timeout:
+        raise InvalidRequest.of("/timeout", "out_of_range", f"may be at most {caps.timeout:g} s")
+    names = {f.name for f in fields(PlanRequest)} & type(body).model_fields.keys() - _OURS
+    given = body.model_dump(include=names, exclude_none=True)
+    given["timeout"] = caps.timeout if body.timeout is None else body.timeout
+    request = PlanRequest.of(body.waypoints, **given, bound="bound" in included(body))
+    sampling = Sampling.of(None if body.sampling is None else body.sampling.model_dump(exclude_none=True))
+    if "samples" in included(body):
+        _refuse_samples(request, sampling, caps.samples // share)
+    return request, sampling
+
+
+def _refuse_samples(request: PlanRequest, sampling: Sampling, most: int) -> None:
+    """Refuse more samples than the cap before solving, as far as the duration is known by then."""
+    least = 0.0 if request.duration is None else request.duration.min
+    if request.times is not None:
+        least = float(request.times[-1] - request.times[0])
+    else:
+        least = max(least, sum(b.min for b in request.segment_durations or () if b is not None))
+    if least == 0.0 and (request.waypoints != request.waypoints[0]).any():
+        if sampling.dt is not None:
+            return
+        least = 1.0  # any: the count does not depend on it
+    count = sample_count(sampling, least)
+    if count * request.dims > most:
+        hint = f"at least {count:,} samples of {request.dims} joints were asked; take fewer, or leave samples out"
+        raise TooLarge("samples x joints", most, hint)

@@ -1,0 +1,24 @@
+"""``GET /v1/methods``: what each method does, needs and honours."""
+
+from fastapi import APIRouter
+from starlette.requests import Request
+from starlette.responses import Response
+
+from planner import describe_method, list_methods
+
+from ..openapi import operation
+from ..web import respond
+
+router = APIRouter()
+
+
+@router.get("/v1/methods", **operation("methods"))
+def methods(request: Request) -> Response:
+    """List the methods in order of presentation."""
+    return respond(request, list_methods())
+
+
+@router.get("/v1/methods/{id}", **operation("method"))
+def method(request: Request) -> Response:
+    """Describe one method."""
+    return respond(request, describe_method(request.path_params["id"]))

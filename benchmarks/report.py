@@ -1,0 +1,151 @@
+"""The report: CSV files with everything, Markdown with what a reader wants to see."""
+
+import csv
+import os
+import platform
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from planner import __version__
+
+from .cases import GROUPS
+from .rows import Row
+from .service import PARTS, Split
+
+PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig")
+
+INTRODUCTION = """# Benchmarks
+
+Our methods beside the documented calls of toppra (its quick start), ruckig (offline: one calculation a segment, from
+rest to rest) and scipy, on the same problems. Made by `make bench`.
+
+- **Certified**: the answer keeps everything asked (limits, waypoints, rest at the ends) to 1e-6 relative, judged by our
+  verification at the exact extrema of the pieces. A peer's answer is taken over piece by piece, not sampled. A peer
+  that does not know a kind of limit cannot be expected to keep it; the table says what comes of using it all the same.
+- **Velocity, acceleration, jerk**: the peak divided by its limit.
+- **ms**: median process time of one call, one thread, entries run in turn. Ours includes checking the request and
+  certifying the answer, which the peers do not do; *solving* (by the clock) is the part without it. **x** is the time
+  divided by that of the first peer, round by round.
+- **Best known**: the best value in the problem's data (a long search, a fine grid or another solver): what is
+  possible, not what any entry here reached.
+"""
+
+SUMMARY = "Above 1: slower than the first peer, in the last column worse than the best known.\n"
+
+
+def write(rows: Sequence[Row], splits: Sequence[Split], out: Path) -> Path:
+    """Write ``rows.csv``, ``service.csv`` and ``report.md`` to a folder; return the report's path."""
+    out.mkdir(parents=True, exist_ok=True)
+    _csv(out / "rows.csv", [asdict(r) for r in rows])
+    _csv(out / "service.csv", [{**asdict(s), "rest": s.rest} for s in splits])
+    report = out / "report.md"
+    report.write_text(markdown(rows, splits), encoding="utf-8")
+    return report
+
+
+def markdown(rows: Sequence[Row], splits: Sequence[Split]) -> str:
+    """Return the report."""
+    parts = [INTRODUCTION, machine(), "## Summary\n", SUMMARY, summary(rows)]
+    for group, about in GROUPS.items():
+        parts += [f"## {group.capitalize()}\n", f"{about}\n"]
+        for problem in dict.fromkeys(r.problem for r in rows if r.group == group):
+            parts += [_problem([r for r in rows if r.problem == problem])]
+    if splits:
+        parts += ["## Where a request's time goes\n", _service(splits)]
+    return "\n".join(parts)
+
+
+def machine() -> str:
+    """Return what the figures were measured on."""
+    system = f"{_processor()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
+    versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    return f"Measured on {system}; waywright {__version__}, {versions}.\n"
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Return a line an entry and group: how often certified, how fast, how far from the best known."""
+    lines = []
+    for group, entry in dict.fromkeys((r.group, r.entry) for r in rows):
+        mine = [r for r in rows if (r.group, r.entry) == (group, entry)]
+        times = [r.time_ratio for r in mine if r.time_ratio is not None]
+        kept = [r for r in mine if r.certified]
+        beyond = [_value(r) / r.reference for r in kept if r.reference and _value(r) is not None]
+        lines.append(
+            [
+                group,
+                entry,
+                f"{len(kept)} of {len(mine)}",
+                _number(median(times) if times else None, ".3g"),
+                _number(median(beyond) if beyond else None, ".4f"),
+            ]
+        )
+    heads = [
+        "group",
+        "entry",
+        "certified",
+        "time, x the first peer's (median)",
+        "value / best known (median, certified)",
+    ]
+    return _table(heads, lines)
+
+
+def _problem(rows: Sequence[Row]) -> str:
+    best = "" if rows[0].reference is None else f" (best known: {rows[0].reference:.6g})"
+    lines = [
+        [
+            r.entry,
+            "yes" if r.certified else "**no**",
+            _number(r.duration, ".4f"),
+            _number(r.squared_jerk, ".5g"),
+            *(_number(x, ".4f") for x in (r.velocity, r.acceleration, r.jerk)),
+            _number(r.ms, ".3g"),
+            _number(r.solve_ms, ".3g"),
+            _number(r.time_ratio, ".3g"),
+            r.why.replace("|", "/"),
+        ]
+        for r in rows
+    ]
+    heads = "entry,certified,duration s,squared jerk,velocity,acceleration,jerk,ms,solving,x,what is broken".split(",")
+    return f"### {rows[0].problem}{best}\n\n{_table(heads, lines)}"
+
+
+def _service(splits: Sequence[Split]) -> str:
+    lines = []
+    for s in splits:
+        shares = (f"{100 * getattr(s, part) / s.total:.0f} %" for part in (*PARTS, "rest"))
+        lines.append([s.request, s.method, f"{s.total:.2f}", *shares])
+    intro = "In process, without a network; *rest* is reading the body, routing and the test's own client.\n\n"
+    return intro + _table(["request", "method", "total ms", *PARTS, "rest"], lines)
+
+
+def _value(row: Row) -> Any:
+    return row.squared_jerk if row.group == "times" else row.duration
+
+
+def _number(value: float | None, form: str) -> str:
+    return "" if value is None else "∞" if value == float("inf") else format(value, form)
+
+
+def _table(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    out = [heads, ["---"] * len(heads), *lines]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in out) + "\n"
+
+
+def _csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        if rows:
+            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
