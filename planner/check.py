@@ -98,7 +98,7 @@ def _refuse_unsupported(request: PlanRequest, method: Method, can: Capabilities,
     refused = words - set(can.words)
     for side in ("start", "end"):
         taken: frozenset[str] = getattr(can, side)
-        if request.limits.jerk is None:
+        if not _jerk_limited(request).all():
             taken -= can.with_jerk
         refused |= {f"boundary_{name}" for name in getattr(request, side).given() if name not in taken}
     if not refused:
@@ -175,14 +175,23 @@ def _resolved(request: PlanRequest, can: Capabilities, side: str) -> Boundary:
     """Return the end state with the method's defaults filled in: zero where it takes or forces a derivative."""
     given: Boundary = getattr(request, side)
     names = getattr(can, side) | can.rests
-    if request.limits.jerk is None:
-        names -= can.with_jerk
-    zero = np.zeros(request.dims)
-    return Boundary(**{n: zero if getattr(given, n) is None else getattr(given, n) for n in names})
+    values = {}
+    for name in names:
+        value = getattr(given, name)
+        values[name] = np.zeros(request.dims) if value is None else value
+        if name in can.with_jerk and value is None:
+            values[name] = np.where(_jerk_limited(request), 0.0, np.nan)
+    return Boundary(**{n: v for n, v in values.items() if not np.isnan(v).all()})
+
+
+def _jerk_limited(request: PlanRequest) -> NDArray[np.bool_]:
+    """Return which joints have a jerk limit on both sides, (D,)."""
+    jerk = request.limits.bounds(3, request.dims)
+    return np.asarray(np.isfinite(jerk.lower) & np.isfinite(jerk.upper))
 
 
 def _moving(state: Boundary) -> bool:
-    return any(getattr(state, name).any() for name in state.given())
+    return any(np.nan_to_num(getattr(state, name)).any() for name in state.given())
 
 
 def _refuse_hopeless(request: PlanRequest, timed: bool) -> None:
@@ -205,7 +214,7 @@ def _refuse_beyond(request: PlanRequest, order: int, values: Array, first: int, 
     limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
     lower, upper = limit.lower[first : first + len(values)], limit.upper[first : first + len(values)]
     slack = 1e-9 * magnitude(lower, upper)
-    outside = (values > upper + slack) | (values < lower - slack)
+    outside = (values > upper + slack) | (values < lower - slack)  # never for NaN, a free joint
     if outside.any():
         row, joint = (int(i) for i in np.argwhere(outside)[0])
         value, segment = float(values[row, joint]), first + row

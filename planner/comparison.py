@@ -1,11 +1,12 @@
 """Many methods on one request; a method that refuses is a row like any other."""
 
+import logging
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import PlannerError
+from .errors import PlannerError, SolverFailed
 from .methods import METHODS
 from .planning import Plan, pick, plan
 from .types import PlanRequest
@@ -40,8 +41,12 @@ def compare(request: PlanRequest, methods: str | Sequence[str | tuple[str, Mappi
 def _row(request: PlanRequest, method: str, options: Mapping[str, Any]) -> Row:
     started = time.perf_counter()
     try:
-        made, error = plan(request, method, options), None
+        made: Plan | None = plan(request, method, options)
+        error: PlannerError | None = None
     except PlannerError as refusal:
         made, error = None, refusal
+    except Exception:  # a bug in one method must not cost the others' rows
+        logging.getLogger(__name__).exception("method %s failed unexpectedly", method)
+        made, error = None, SolverFailed(method, "failed unexpectedly; this is a bug, please report it")
     elapsed = 1e3 * (time.perf_counter() - started)
     return Row(made.method if made else method, made, error, elapsed)

@@ -173,7 +173,7 @@ class DurationBounds:
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """The state asked for at an end; (D,) each, None where it is left to the method."""
+    """The state asked for at an end; (D,) each, None (or NaN for a joint) where it is left to the method."""
 
     velocity: Array | None = None
     acceleration: Array | None = None

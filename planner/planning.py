@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .bounds import objective
 from .check import Asked, check
-from .errors import Infeasible, InvalidRequest, NotVerified, TimeLimit, UnknownMethod
+from .errors import Infeasible, InvalidRequest, NotVerified, TimeLimit, UnknownMethod, Unsupported
 from .method import Method
 from .methods import METHODS
 from .options import Options, read_options
@@ -62,15 +62,19 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
     chosen = read_options(row.options, dict(options) if isinstance(options, Mapping) else options)
     asked = check(request, row, chosen, METHODS.values())
     checked = time.perf_counter()
-    solution = hold(asked) if asked.still else row.solve(asked.request, chosen)
+    with np.errstate(all="ignore"):  # what overflows does not verify
+        solution = hold(asked) if asked.still else row.solve(asked.request, chosen)
     solved = time.perf_counter()
     if request.timeout is not None and solved - started > request.timeout:
         raise TimeLimit(request.timeout)
     times = None if solution.waypoint_times is None else solution.waypoint_times[asked.kept]
-    certificate = verify(solution.trajectory, asked.demands, times, solution.path)
+    with np.errstate(all="ignore"):
+        certificate = verify(solution.trajectory, asked.demands, times, solution.path)
     name = row.objective
     judged = replace(certificate, objective=objective(name, certificate, solution.trajectory.duration, solution.bound))
     if not certificate.holds:
+        if (reason := beyond_precision(solution.trajectory, request.waypoints)) is not None:
+            raise Unsupported(row.id, "precision", reason=reason)
         raise NotVerified(row.id, asdict(judged))
     done = time.perf_counter()
     pose = max(solved - checked - solution.stats.seconds, 0.0)
@@ -109,24 +113,37 @@ def pick(request: PlanRequest, method: str) -> tuple[Method, str | None]:
     raise InvalidRequest.of(missing, "missing", "give times, or limits on acceleration or on velocity to jerk")
 
 
+def beyond_precision(trajectory: Trajectory, waypoints: Array) -> str | None:
+    """Return why double precision cannot hold such a motion, or None: that is then no excuse."""
+    span = max(1.0, float(np.ptp(waypoints, axis=0).max()), float(np.abs(waypoints).max()))
+    shortest, latest = float(np.diff(trajectory.breaks).min()), float(np.abs(trajectory.breaks).max())
+    if np.finfo(float).eps * latest > 1e-9 * shortest:
+        return f"a phase of {shortest:.3g} s at {latest:.3g} s on the clock is beyond double precision: rescale"
+    largest = float(np.abs(trajectory.coefficients).max())
+    if largest > 1e8 * span:
+        return f"the curve leaves the waypoints' range by a factor of {largest / span:.3g}, beyond double precision"
+    return None
+
+
 def hold(asked: Asked) -> Solution:
     """Return the answer where nothing moves: the position is held, for as long as times or durations ask."""
     request = asked.request
+    steps = np.zeros(request.count - 1) if request.times is None else np.diff(request.times)
+    least = [0.0 if b is None else b.min for b in request.segment_durations or [None] * len(steps)]
+    steps = np.maximum(steps, least)
+    if request.duration is not None:
+        if steps.sum() > request.duration.max * (1.0 + 1e-9):
+            raise Infeasible(
+                "the times or minimum durations add up to more than the duration allows",
+                quantity="duration",
+                bound=request.duration.max,
+                needed=float(steps.sum()),
+                minimum_duration=float(steps.sum()),
+                certified=True,
+            )
+        steps[-1] += max(request.duration.min - steps.sum(), 0.0)
+    times = np.concatenate([[0.0], np.cumsum(steps)])
     if request.times is not None:
-        times = request.times
-    else:
-        least = [0.0 if b is None else b.min for b in request.segment_durations or [None] * (request.count - 1)]
-        times = np.concatenate([[0.0], np.cumsum(least)])
-        if request.duration is not None:
-            if times[-1] > request.duration.max:
-                raise Infeasible(
-                    "the segments' minimum durations add up to more than the duration allows",
-                    quantity="duration",
-                    bound=request.duration.max,
-                    needed=float(times[-1]),
-                    minimum_duration=float(times[-1]),
-                    certified=True,
-                )
-            times[-1] = max(times[-1], request.duration.min)
+        times = np.where(steps.sum() > np.ptp(request.times), request.times[0] + times, request.times)
     trajectory = Trajectory.hold(request.waypoints[0], float(times[0]), float(times[-1]))
     return Solution(trajectory, times, Stats("hold", "nothing moves", 0))

@@ -211,15 +211,17 @@ class Trajectory:
     def counted_jumps(self, order: int, peak: Array, span: float = 1.0) -> NDArray[np.bool_]:
         """Return which jumps at the interior breaks count as such, shape (K - 1, D).
 
-        Positions: above 1e-6 x ``span``; other derivatives: above 1e-6 of their ``peak`` (D,) and above rounding.
+        Positions: above 1e-6 x ``span``; other derivatives: above 1e-6 of their ``peak`` (D,) and above the rounding
+        of values and of the clock.
         """
         if self.pieces == 1:
             return np.zeros((0, self.dims), dtype=bool)
         jumps = np.abs(self.jumps(order))
         if order == 0:
             return np.asarray(jumps > JUMP * span)
-        size = 1e3 * np.abs(self.coefficients[:-1]).max(axis=0, initial=0.0) + 64 * np.abs(self.coefficients[-1])
-        rounding = np.finfo(float).eps * size / np.diff(self.breaks)[:, None] ** order
+        size = 1e3 * np.abs(self.coefficients).max(axis=0)
+        h = np.diff(self.breaks)[:, None]
+        rounding = np.finfo(float).eps * (size / h**order + order * np.abs(self.breaks).max() / h * peak)
         return np.asarray(jumps > JUMP * peak + np.maximum(rounding[1:], rounding[:-1]))
 
     def extrema(self, orders: int = 4) -> Extrema:

@@ -237,7 +237,7 @@ def _boundary_error(motion: _Motion) -> float | None:
             relative = np.maximum(np.maximum(1.0, limit), motion.peaks[order])
             left, right = motion.trajectory.ends(order)
             reached = (left if index == 0 else right)[index]
-            error = float((np.abs(reached - asked) / relative).max())
+            error = float((np.abs(reached - asked) / relative)[~np.isnan(asked)].max(initial=0.0))
             worst = error if worst is None else max(worst, error)
     return worst
 

@@ -92,7 +92,15 @@ def test_statements_are_pure():
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
             for name in names:
-                assert name.split(".")[0] in ("numpy", "scipy", "dataclasses", "typing", "math", "problems"), path
+                assert name.split(".")[0] in (
+                    "numpy",
+                    "scipy",
+                    "dataclasses",
+                    "functools",
+                    "typing",
+                    "math",
+                    "problems",
+                ), path
 
 
 def test_modules_are_small():

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from problems.rest_to_rest import double_integrator, triple_integrator
 
-from ..errors import Infeasible
-from ..limits import QUANTITIES, Boundary, Limit, segment_bounds
+from ..errors import Infeasible, SolverFailed, Unsupported
+from ..limits import Boundary, Limit, segment_bounds
 from ..method import Capabilities, Method, Reference
 from ..options import Options
-from ..timing.state_to_state import Segment, time_optimal
+from ..timing.state_to_state import Segment, refuse_overshoot, time_optimal
 from ..timing.stops import segment_durations, stops_bound
 from ..trajectory import Trajectory
 from ..types import Bound, Note, PlanRequest, Solution, Stats
@@ -26,7 +26,7 @@ class RuckigOptions(Options):
 def solve(request: PlanRequest, options: RuckigOptions) -> Solution:
     """Return time-optimal segments from waypoint to waypoint, at rest in between."""
     segments = _segments(request)
-    parts = [_hold(s) if _still(s) else time_optimal(s) for s in segments]
+    parts = [_shortest(s, i) for i, s in enumerate(segments)]
     durations = segment_durations(np.array([p.duration for p in parts]), request)
     for i, (segment, part, duration) in enumerate(zip(segments, parts, durations, strict=True)):
         if duration <= part.duration * (1.0 + 1e-12):
@@ -36,13 +36,12 @@ def solve(request: PlanRequest, options: RuckigOptions) -> Solution:
         elif segment.rests:
             parts[i] = part.scaled(duration / part.duration)
         else:
-            parts[i] = time_optimal(replace(segment, least=duration))
+            parts[i] = _shortest(replace(segment, least=duration), i)
     times = np.concatenate([[0.0], np.cumsum([p.duration for p in parts])])
     kept = [p.shifted(t) for p, t in zip(parts, times, strict=False) if p.duration > 0]
     trajectory = Trajectory.concatenate(kept)
-    for segment, part in zip(segments, parts, strict=True):
-        if not segment.rests:
-            _refuse_overshoot(segment, part, request)
+    for i, (segment, part) in enumerate(zip(segments, parts, strict=True)):
+        refuse_overshoot(segment, part, i)
     notes: tuple[Note, ...] = ()
     jerk = request.limits.jerk
     if jerk is not None and (jerk.lower != -jerk.upper).any():
@@ -59,7 +58,7 @@ def _segments(request: PlanRequest) -> list[Segment]:
 
     def state(boundary: Boundary, name: str) -> Array:
         value = getattr(boundary, name)
-        return zero if value is None else np.asarray(value)
+        return zero if value is None else np.nan_to_num(value)
 
     return [
         Segment(
@@ -81,26 +80,19 @@ def _still(segment: Segment) -> bool:
     return segment.rests and not (segment.p1 - segment.p0).any()
 
 
-def _hold(segment: Segment) -> Trajectory:
-    return Trajectory.hold(segment.p0, 0.0, 0.0)
-
-
-def _refuse_overshoot(segment: Segment, part: Trajectory, request: PlanRequest) -> None:
-    """Refuse where the asked end state itself leads beyond a limit, so that ruckig brakes outside of it."""
-    found = part.extrema(4)
-    for order, limit in ((1, segment.velocity), (2, segment.acceleration)):
-        over = np.maximum(found.high[order] - limit.upper, limit.lower - found.low[order]) / limit.scale()
-        if over.max() > 1e-9:
-            piece, joint = (int(i) for i in np.unravel_index(int(np.argmax(over)), over.shape))
-            high = found.high[order][piece, joint] > limit.upper[joint]
-            raise Infeasible(
-                f"the state asked at an end leads beyond the {QUANTITIES[order]} limit of joint {joint}",
-                joint=joint,
-                quantity=QUANTITIES[order],
-                segment=0 if segment.v0.any() or segment.a0.any() else request.count - 2,
-                bound=float((limit.upper if high else limit.lower)[joint]),
-                needed=float((found.high if high else found.low)[order][piece, joint]),
-            )
+def _shortest(segment: Segment, index: int) -> Trajectory:
+    if _still(segment):
+        return Trajectory.hold(segment.p0, 0.0, 0.0)
+    try:
+        return time_optimal(segment)
+    except SolverFailed as error:
+        if segment.rests:  # mixes of scales that ruckig does not take
+            reason = f"ruckig finds no motion on segment {index}: {error.status}"
+            raise Unsupported("ruckig", "limits", ["trapezoidal", "time_optimal_nlp"], reason) from None
+        raise Infeasible(
+            f"ruckig finds no motion within the limits from or to the state asked at the end of segment {index}",
+            segment=index,
+        ) from None
 
 
 def _bound(segments: list[Segment], request: PlanRequest) -> Bound | None:

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from ..deadline import Deadline
-from ..errors import SolverFailed
+from ..errors import SolverFailed, Unsupported
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
 from ..timing.following import Timed, Units, follow
@@ -57,7 +57,8 @@ def solve(request: PlanRequest, options: ToppraOptions) -> Solution:
                 break
             grid = refined(grid, factors > 1.0 + 0.25 * (GOOD - 1.0))
         if law is None:
-            raise failure or SolverFailed("toppra", "no parameterisation found")
+            reason = f"the toppra library fails on this path: {failure.status if failure else 'no answer'}"
+            raise Unsupported("toppra", "path", ["time_optimal_nlp", "trapezoidal"], reason)
         return Timed(law, spent)
 
     return follow(path, request, timed, "toppra")

@@ -15,7 +15,7 @@ from problems.banded_qp import BandedQP, DualPoint
 from problems.minimum_jerk import MinimumJerk
 
 from ..deadline import Deadline
-from ..errors import InvalidRequest, SolverFailed
+from ..errors import Infeasible, InvalidRequest, SolverFailed
 from ..limits import segment_bounds
 from ..solvers import Backend, select
 from ..solvers.qp import solve_qp
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 #: Neighbouring gaps with a smaller ratio leave too few digits for the elimination.
 UNEVEN = 1e-6
-ROUNDS = 60
+ROUNDS = 40
 
 
 def minimum_jerk(request: PlanRequest, backend: str) -> Solution:
@@ -40,7 +40,7 @@ def minimum_jerk(request: PlanRequest, backend: str) -> Solution:
         Times too uneven for double precision (``out_of_range``).
     Infeasible
         One quintic per gap cannot keep a joint's limits at these times; certified, with the smallest relaxation.
-    SolverFailed, TimeLimit
+    TimeLimit
     """
     assert request.times is not None
     deadline = Deadline(request.timeout)
@@ -115,23 +115,40 @@ def _within_limits(cuts: Cuts, backend: str, deadline: Deadline) -> tuple[_Joint
     """Return the joint's optimum within its limits, the back end's name, the rounds and the seconds in the solver.
 
     Limits are first tightened by 1e-7 so that the answer keeps them strictly; where that alone makes the program
-    infeasible, they are kept to rounding.
+    infeasible, they are kept to rounding. A failure is explained by the smallest relaxation, where that can be found.
+
+    Raises
+    ------
+    Infeasible
+        Certified if the relaxation proves it; otherwise no solver found a motion, and neither was it proved.
     """
-    failure: SolverFailed | None = None
-    for chosen in select("qp", backend):
-        try:
-            return _rounds(cuts, chosen, deadline)
-        except SolverFailed as error:
-            failure = error
-    least_relaxation(cuts, deadline)  # raises Infeasible where that is the reason
-    exact = cuts.exact()
-    for chosen in select("qp", backend):
-        try:
-            return _rounds(exact, chosen, deadline)
-        except SolverFailed as error:
-            failure = error
-    assert failure is not None
-    raise failure
+    chosen = select("qp", backend)
+    attempts = [(cuts, b) for b in chosen]
+    try:
+        return _rounds(*attempts[0], deadline)
+    except SolverFailed:
+        relaxation_known = _explain(cuts, deadline)
+    if relaxation_known:
+        attempts.insert(1, (cuts.exact(), chosen[0]))
+        for attempt in attempts[1:]:
+            try:
+                return _rounds(*attempt, deadline)
+            except SolverFailed:
+                continue
+    raise Infeasible(
+        f"no solver finds a motion of one quintic per gap within the limits of joint {cuts.joint} at these times; "
+        "that none exists is not proved",
+        joint=cuts.joint,
+    )
+
+
+def _explain(cuts: Cuts, deadline: Deadline) -> bool:
+    """Raise Infeasible where that is proved; return whether the limits were found to be possible."""
+    try:
+        least_relaxation(cuts, deadline)
+    except SolverFailed:
+        return False
+    return True
 
 
 def _rounds(cuts: Cuts, backend: Backend, deadline: Deadline) -> tuple[_Joint, str, int, float]:

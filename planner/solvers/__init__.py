@@ -32,7 +32,7 @@ def _piqp(tolerance: float, limit: float | None) -> dict[str, Any]:
 
 
 def _osqp(tolerance: float, limit: float | None) -> dict[str, Any]:
-    settings: dict[str, Any] = {"eps_abs": tolerance, "eps_rel": tolerance, "max_iter": 100_000, "polishing": True}
+    settings: dict[str, Any] = {"eps_abs": tolerance, "eps_rel": tolerance, "max_iter": 20_000, "polishing": True}
     return settings if limit is None else {**settings, "time_limit": limit}
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverFailed
-from ..limits import Limit
+from ..errors import Infeasible, SolverFailed
+from ..limits import QUANTITIES, Limit
 from ..trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 #: In scaled units every move takes about one, so limits above such a cap hardly bind; where ruckig fails with the first
 #: cap (it takes limits up to 1e9, but mixes of scales trouble it) the next is tried.
 CAPS = (9e8, 1e8, 1e6, 1e4)
+#: Numbers in this range need no scaling.
+PLAIN = (1e-3, 1e5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,10 @@ def time_optimal(segment: Segment) -> Trajectory:
         ruckig finds no motion.
     """
     second, unit = _units(segment)
-    for cap in CAPS:
+    attempts = [(second, unit, cap) for cap in CAPS]
+    if _plain(segment, second):
+        attempts.insert(0, (1.0, np.ones_like(unit), CAPS[0]))
+    for second, unit, cap in attempts:
         scaled = _scaled(segment, second, unit, cap)
         try:
             duration, phases = _ruckig(scaled)
@@ -62,6 +67,14 @@ def time_optimal(segment: Segment) -> Trajectory:
     coefficients = pieces.coefficients * unit
     coefficients[-1] += segment.p0
     return Trajectory(pieces.breaks * second, coefficients)
+
+
+def _plain(s: Segment, second: float) -> bool:
+    """Return whether all numbers are of ordinary size as they stand."""
+    numbers = [s.p1 - s.p0, s.velocity.upper, s.velocity.lower, s.acceleration.upper, s.acceleration.lower, s.jerk]
+    sizes = np.abs(np.concatenate([*numbers, s.v0, s.v1, s.a0, s.a1]))
+    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+    return bool(sizes.min() >= PLAIN[0] and sizes.max() <= PLAIN[1] and PLAIN[0] <= second <= 1e3)
 
 
 def _units(s: Segment) -> tuple[float, Array]:
@@ -152,3 +165,23 @@ def _pieces(duration: float, phases: list[list[tuple[float, float, float, float,
         powers[1:, done, d] = 0.0
         powers[0, done, d] = s.p1[d]
     return Trajectory.from_powers(breaks, powers)
+
+
+def refuse_overshoot(segment: Segment, motion: Trajectory, index: int) -> None:
+    """Refuse where the asked end state itself leads beyond a limit, so that ruckig brakes outside of it."""
+    if segment.rests:
+        return
+    found = motion.extrema(4)
+    for order, limit in ((1, segment.velocity), (2, segment.acceleration)):
+        over = np.maximum(found.high[order] - limit.upper, limit.lower - found.low[order]) / limit.scale()
+        if over.max() > 1e-9:
+            piece, joint = (int(i) for i in np.unravel_index(int(np.argmax(over)), over.shape))
+            high = found.high[order][piece, joint] > limit.upper[joint]
+            raise Infeasible(
+                f"the state asked at an end leads beyond the {QUANTITIES[order]} limit of joint {joint}",
+                joint=joint,
+                quantity=QUANTITIES[order],
+                segment=index,
+                bound=float((limit.upper if high else limit.lower)[joint]),
+                needed=float((found.high if high else found.low)[order][piece, joint]),
+            )
