@@ -1,5 +1,6 @@
 """The method table as data: what the service lists, the docs print and the battery tests."""
 
+import json
 from dataclasses import asdict
 from typing import Any
 
@@ -55,3 +56,39 @@ def _capabilities(can: Capabilities) -> dict[str, Any]:
         "honours": list(can.words),
         "continuity": can.continuity,
     }
+
+
+def markdown() -> str:
+    """Return the catalogue as a Markdown page: a table, then a section per method."""
+    entries, columns = list_methods(), ("title", "family", "timing", "path", "continuity")
+    lines = [
+        "# Methods",
+        "",
+        "Made from the method table by `make docs`; a test fails when this page is stale.",
+        "",
+        "| id | what | family | timing | path | continuity |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += ["| " + " | ".join([f"[`{e['id']}`](#{e['id']})", *(str(e[k]) for k in columns)]) + " |" for e in entries]
+    for e in entries:
+        reference = e["reference"]
+        lines += ["", f"## {e['id']}", "", f"{e['title']}. {e['summary']}", "", f"    {e['formula']}", ""]
+        lines += [f"- requires: {_words(e['requires'])}", f"- honours: {_words(e['honours'])}"]
+        lines += [f"- minimises: {e['objective']}"] if e["objective"] else []
+        lines += [
+            f"- with `{json.dumps(v['options'])}`: "
+            + "; ".join(f"{k} {_words(x) if isinstance(x, list) else x}" for k, x in v.items() if k != "options")
+            for v in e["variants"]
+            if len(v) > 1
+        ]
+        lines += [
+            f"- option `{name}`: {o.get('description', '')} (default {json.dumps(o.get('default'))})"
+            for name, o in e["options"].get("properties", {}).items()
+        ]
+        work = f"{reference['authors']}, {reference['title']}, {reference['year']}"
+        lines += [f"- reference: {work}. {reference['where']}"]
+    return "\n".join(lines) + "\n"
+
+
+def _words(words: list[str]) -> str:
+    return ", ".join(f"`{w}`" for w in words) or "nothing"

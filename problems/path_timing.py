@@ -10,8 +10,9 @@ With a = sdot², b = sddot = a'/2 and c = b' (primes: d/ds),
 
 Without a jerk limit b is constant between stations: all rows are linear in the a_i and the program is convex. With one
 c is constant between stations (a is a C1 quadratic spline, a_{i+1} - a_i = (b_i + b_{i+1}) h_i), and the first and the
-last step have constant path jerk: b = 2a / (3h), sdddot = 2 a^{3/2} / (9 h²). Limits are rows at the stations, with the
-path's one-sided derivatives there; nothing is asked between.
+last step have constant path jerk: b = 2a / (3h), sdddot = 2 a^{3/2} / (9 h²). The integral is then Simpson's rule, which
+keeps a positive, and b from swinging, between the stations. Limits are rows at the stations, with the path's one-sided
+derivatives there; nothing is asked between.
 
 References: D. Verscheure et al., Time-optimal path tracking for robots: a convex optimization approach, 2009.
 """
@@ -61,7 +62,8 @@ class PathTiming:
         if self.jerk:
             vb = x[count:]
             ends = 3 * h[0] / root[0] + 3 * h[-1] / root[-1]
-            cost = ends + ca.sum1(2 * h[1:-1] / (root[:-1] + root[1:]))
+            middle = (va[:-1] + va[1:]) / 2 - (vb[1:] - vb[:-1]) * h[1:-1] / 4
+            cost = ends + ca.sum1(h[1:-1] / 6 * (1 / root[:-1] + 4 / ca.sqrt(middle) + 1 / root[1:]))
             rows = _Rows(ca)
             rows.equal(va[1:] - va[:-1] - (vb[:-1] + vb[1:]) * h[1:-1])
             rows.equal(3 * h[0] * vb[0] - 2 * va[0])
@@ -102,7 +104,10 @@ class PathTiming:
                 rows.within(self.derivatives[outer, 0, step, d] * jerk, *bounds)
 
     def read(self, x: Array) -> tuple[Array, Array, Array]:
-        """Return speeds sdot and accelerations sddot at the stations, (n + 1,) each, and the time steps (n,)."""
+        """Return speeds sdot and accelerations sddot at the stations, (n + 1,) each, and the time steps (n,).
+
+        Time steps are infinite where sdot² would vanish between stations.
+        """
         count, h = len(self.steps) - 1, self.steps
         a = np.concatenate([[0.0], np.maximum(x[:count], 0.0), [0.0]])
         speed = np.sqrt(a)
@@ -112,8 +117,8 @@ class PathTiming:
         nodes, weights = np.polynomial.legendre.leggauss(10)
         at = 0.5 * (nodes + 1.0)
         inside = a[:-1, None] + h[:, None] * at * (2.0 * b[:-1, None] + np.diff(b)[:, None] * at)
-        inside = np.maximum(inside, 1e-300)
-        steps = 0.5 * h * (weights / np.sqrt(inside)).sum(axis=1)
+        with np.errstate(divide="ignore"):
+            steps = 0.5 * h * (weights / np.sqrt(np.maximum(inside, 0.0))).sum(axis=1)
         steps[0], steps[-1] = 3.0 * h[0] / speed[1], 3.0 * h[-1] / speed[-2]
         return speed, b, steps
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pydantic import Field
 
 from ..deadline import Deadline
+from ..errors import SolverFailed, Unsupported
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
 from ..timing.following import Timed, Units, follow
@@ -16,7 +17,7 @@ from ..types import PlanRequest, Solution
 
 #: Refinement ends when slowing by this much is all that is left to do, or at so many stations.
 GOOD = 1.002
-MOST = 600
+MOST = 1000
 ROUNDS = 3
 
 
@@ -49,7 +50,11 @@ def solve(request: PlanRequest, options: TimeOptimalNlpOptions) -> Solution:
             best = replace(again, seconds=best.seconds + again.seconds)
         return best
 
-    return follow(path, request, timed, "ipopt")
+    try:
+        return follow(path, request, timed, "ipopt")
+    except SolverFailed as error:
+        reason = f"the nonlinear program has no usable answer on this path: {error}"
+        raise Unsupported("time_optimal_nlp", "path", ["toppra", "trapezoidal"], reason) from None
 
 
 TIME_OPTIMAL_NLP = Method(

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from problems.path_timing import PathTiming
 
+from ..errors import SolverFailed
 from ..limits import Limits
 from ..solvers import select
 from ..solvers.nlp import solve_nlp
@@ -28,6 +29,8 @@ def nlp_law(stretch: Trajectory, limits: Limits, units: Units, grid: Array, time
     guess = _smooth_guess(stretch, limits, units, grid)
     answer = solve_nlp(problem.to_casadi(*guess), select("nlp")[0], time_limit)
     speed, acceleration, steps = problem.read(answer.x)
+    if not (np.isfinite(steps).all() and (steps > 0).all()):
+        raise SolverFailed("ipopt", "the path speed vanishes between stations")
     speed, acceleration = speed * units.parameter / units.second, acceleration * units.parameter / units.second**2
     notes: tuple[Note, ...] = ()
     if answer.status not in ("Solve_Succeeded", "Solved_To_Acceptable_Level"):

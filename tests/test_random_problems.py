@@ -1,0 +1,81 @@
+"""Random feasible problems through HTTP: none refused that is feasible, no 5xx, no broken limit.
+
+`make check` runs a slice, `make check-slow` 2,000; WAYWRIGHT_SEEDS=first:last runs any others. A failure names its
+seed.
+"""
+
+import json
+import os
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from api.app import create_app
+from planner import METHODS, PlanRequest, Trajectory
+from planner.check import asked_words
+
+SLOW = ("time_optimal_nlp",)
+
+
+@pytest.fixture(scope="module")
+def client():
+    with TestClient(create_app()) as made:
+        yield made
+
+
+def methods_for(body):
+    """Every method that honours all that is asked (by its row), with its default options."""
+    given = dict(body)
+    request = PlanRequest.of(given.pop("waypoints"), **given)
+    words = asked_words(request)
+    found = []
+    for row in METHODS.values():
+        can = row.capabilities(row.options())
+        if words <= set(can.words) and can.requires <= words:
+            found.append(row.id)
+    return found
+
+
+def check(client, seed, body, slow):
+    methods = methods_for(body)
+    assert methods, f"seed {seed}: nobody honours {body}"
+    for method in methods:
+        if method in SLOW and not slow:
+            continue
+        sent = {**body, "method": method, "sampling": {"count": 50}, "include": ["samples", "polynomial"]}
+        answer = client.post("/v1/trajectories", content=json.dumps(sent), headers={"content-type": "application/json"})
+        where = f"seed {seed}, {method}: {answer.text[:600]}"
+        if answer.status_code == 422 and METHODS[method].path == "fixed" and "position" in body.get("limits", {}):
+            problem = answer.json()  # the known spline keeps the position limits, this method's own path need not
+            assert problem["quantity"] == "position" and problem["certified"], where
+            continue
+        assert answer.status_code == 200, where
+        plan = answer.json()
+        assert plan["certificate"]["holds"], where
+        for row in plan["certificate"]["checks"]:
+            assert row["holds"], where
+            if row["quantity"] in ("velocity", "acceleration", "jerk"):
+                assert row["ratio"] <= 1 + 1e-8, where
+        assert plan["certificate"]["waypoint_error"] <= 1e-9, where
+        trajectory = Trajectory.from_powers(plan["polynomial"]["breaks"], plan["polynomial"]["coefficients"])
+        times = np.clip(plan["samples"]["time"], trajectory.start, trajectory.end)
+        scale = max(1.0, float(np.ptp(body["waypoints"], axis=0).max()))
+        assert np.abs(trajectory(times) - plan["samples"]["position"]).max() <= 1e-9 * scale, where
+
+
+def seeds(default):
+    given = os.environ.get("WAYWRIGHT_SEEDS")
+    first, last = (int(x) for x in given.split(":")) if given else default
+    return range(first, last)
+
+
+def test_a_slice_of_random_problems(client, random_problem):
+    for seed in seeds((0, 150)):
+        check(client, seed, random_problem(seed), slow=seed % 50 == 0)
+
+
+@pytest.mark.slow
+def test_two_thousand_random_problems(client, random_problem):
+    for seed in seeds((10_000, 12_000)):
+        check(client, seed, random_problem(seed), slow=seed % 40 == 0)
