@@ -10,7 +10,7 @@ With a = sdot², b = sddot = a'/2 and c = b' (primes: d/ds),
 
 Without a jerk limit b is constant between stations: all rows are linear in the a_i and the program is convex. With one
 c is constant between stations (a is a C1 quadratic spline, a_{i+1} - a_i = (b_i + b_{i+1}) h_i), and the first and the
-last step have constant path jerk: b = 2a / (3h), sdddot = 2 a^{3/2} / (9 h²). The integral is then Simpson's rule, which
+last step have constant path jerk: b = 2a / (3h), sdddot = 2 a^{3/2} / (9 h²). The integral is Simpson's rule, which
 keeps a positive, and b from swinging, between the stations. Limits are rows at the stations, with the path's one-sided
 derivatives there; nothing is asked between.
 
