@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import planner
 from planner import METHODS, PlanRequest, Trajectory, UnknownMethod, Unsupported, describe_method, list_methods, plan
 from planner.catalogue import markdown
 from planner.method import Capabilities, Method, Reference
 from planner.options import CAPABILITIES, Options
 from planner.types import Solution, Stats
 
-ROOT = Path(planner.__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parent.parent
 CONTRACT = {
     "id", "title", "family", "summary", "formula", "reference", "timing", "requires", "honours", "continuity",
     "variants", "path", "objective", "options",

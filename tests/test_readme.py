@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 import uvicorn
 
-import planner
 from api.__main__ import main
 from api.app import create_app
 
-README = (Path(planner.__file__).resolve().parent.parent / "README.md").read_text(encoding="utf-8")
+README = (Path(__file__).resolve().parent.parent / "README.md").read_text(encoding="utf-8")
 PYTHON = re.findall(r"```python\n(.*?)```", README, re.S)
 SHELL = re.findall(r"```sh\n(.*?)```", README, re.S)
 

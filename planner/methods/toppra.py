@@ -7,14 +7,15 @@ from pydantic import Field
 
 from ..deadline import Deadline
 from ..errors import SolverFailed, Unsupported
+from ..limits import Limits
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
-from ..timing.following import Timed, Units, follow
+from ..timing.following import Timed, Units, follow, in_a_row, split
 from ..timing.grids import constant_acceleration_law, initial_grid, refined
 from ..timing.scaling import local_factors
 from ..timing.toppra_speeds import toppra_speeds
 from ..trajectory import Trajectory
-from ..types import PlanRequest, Solution
+from ..types import Note, PlanRequest, Solution
 
 #: Refinement ends when slowing by this much is all that is left to do, or at so many stations.
 GOOD = 1.001
@@ -39,29 +40,43 @@ def solve(request: PlanRequest, options: ToppraOptions) -> Solution:
     path = build_path(options.path, request.waypoints)
 
     def timed(stretch: Trajectory, units: Units) -> Timed:
-        grid = initial_grid(stretch, options.stations or max(300, 20 * stretch.pieces))
-        law, failure, spent = None, None, 0.0
-        for _ in range(1 if options.stations else ROUNDS):
-            deadline.left()
-            started = time.perf_counter()
-            try:
-                law = constant_acceleration_law(grid, toppra_speeds(stretch, request.limits, units, grid))
-            except SolverFailed as error:  # other stations often help
-                failure = error
-                grid = refined(grid, np.ones(len(grid) - 1, dtype=bool))
-                continue
-            finally:
-                spent += time.perf_counter() - started
-            factors = local_factors(stretch.compose(law), request.limits)
-            if factors.max() <= GOOD or len(grid) > MOST or len(factors) != len(grid) - 1:
-                break
-            grid = refined(grid, factors > 1.0 + 0.25 * (GOOD - 1.0))
-        if law is None:
-            reason = f"the toppra library fails on this path: {failure.status if failure else 'no answer'}"
-            raise Unsupported("toppra", "path", ["time_optimal_nlp", "trapezoidal"], reason)
-        return Timed(law, spent)
+        try:
+            return _refined(stretch, units, request.limits, options.stations, deadline)
+        except SolverFailed as error:
+            if stretch.pieces == 1:
+                reason = f"the toppra library fails on this path: {error.status}"
+                raise Unsupported("toppra", "path", ["time_optimal_nlp", "trapezoidal"], reason) from None
+        shortest = int(np.argmin(np.diff(stretch.breaks)))  # where it is, speeds differ most from those elsewhere
+        parts = split(stretch, stretch.breaks[1:-1][[k in (shortest - 1, shortest) for k in range(stretch.pieces - 1)]])
+        each = [timed(part, Units.of(part, request.limits)) for part in parts]
+        message = "toppra fails on the path as a whole: the motion stops at both ends of its shortest piece"
+        return Timed(in_a_row([e.law for e in each]), sum(e.seconds for e in each), (Note("stops_added", message),))
 
     return follow(path, request, timed, "toppra")
+
+
+def _refined(stretch: Trajectory, units: Units, limits: Limits, stations: int | None, deadline: Deadline) -> Timed:
+    """Return the law on a grid that is halved where the limits are broken between the stations."""
+    grid = initial_grid(stretch, stations or max(300, 20 * stretch.pieces))
+    law, failure, spent = None, None, 0.0
+    for _ in range(1 if stations else ROUNDS):
+        deadline.left()
+        started = time.perf_counter()
+        try:
+            law = constant_acceleration_law(grid, toppra_speeds(stretch, limits, units, grid))
+        except SolverFailed as error:  # other stations often help
+            failure = error
+            grid = refined(grid, np.ones(len(grid) - 1, dtype=bool))
+            continue
+        finally:
+            spent += time.perf_counter() - started
+        factors = local_factors(stretch.compose(law), limits)
+        if factors.max() <= GOOD or len(grid) > MOST or len(factors) != len(grid) - 1:
+            break
+        grid = refined(grid, factors > 1.0 + 0.25 * (GOOD - 1.0))
+    if law is None:
+        raise failure or SolverFailed("toppra", "no parameterisation found")
+    return Timed(law, spent)
 
 
 TOPPRA = Method(

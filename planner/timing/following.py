@@ -1,6 +1,6 @@
 """From speeds along a path to a trajectory: split at corners, compose exactly, slow down until the limits hold."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,12 +74,12 @@ def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: 
     corners = _corners(path.curve, 2 if request.limits.jerk is not None else 1)
     laws: list[Trajectory] = []
     seconds, notes = 0.0, dict[Note, None]()
-    for stretch in _split(path.curve, corners):
+    for stretch in split(path.curve, corners):
         timed = time_stretch(stretch, Units.of(stretch, request.limits))
-        laws.append(timed.law.shifted(laws[-1].end if laws else 0.0))
+        laws.append(timed.law)
         seconds += timed.seconds
         notes.update(dict.fromkeys(timed.notes))
-    law = Trajectory.concatenate(laws)
+    law = in_a_row(laws)
     times = _reached(law, path.knots)
     trajectory = path.curve.compose(law)
     needed = slowdown(trajectory, request, times)
@@ -108,7 +108,14 @@ def _corners(curve: Trajectory, order: int) -> Array:
     return np.asarray(curve.breaks[1:-1][jumps])
 
 
-def _split(curve: Trajectory, corners: Array) -> list[Trajectory]:
+def in_a_row(laws: Sequence[Trajectory]) -> Trajectory:
+    """Return laws that each start at time 0 as one, each starting where the one before it ends."""
+    starts = np.cumsum([0.0, *(law.duration for law in laws)])
+    return Trajectory.concatenate([law.shifted(start) for law, start in zip(laws, starts, strict=False)])
+
+
+def split(curve: Trajectory, corners: Array) -> list[Trajectory]:
+    """Return the curve cut at some of its breaks."""
     cuts = np.concatenate([[0], np.searchsorted(curve.breaks, corners), [curve.pieces]])
     return [
         Trajectory(curve.breaks[a : b + 1], curve.coefficients[:, a:b])

@@ -71,3 +71,13 @@ def test_one_broken_method_costs_the_others_nothing(monkeypatch, caplog):
     rows = compare(PlanRequest.of([0, 1], times=[0, 1]), ["linear", "minimum_jerk"])
     assert rows[0].error.code == "solver_failed" and rows[1].plan.certificate.holds
     assert "failed unexpectedly" in caplog.text
+
+
+def test_toppra_on_a_path_with_one_tiny_gap():
+    """Speeds ten orders apart on one path are too much for toppra's tolerances: stretches are timed one by one."""
+    points = np.array([[24.0, -18, -21], [8, -44, -38], [61, 78, 60], [13, 7, 22], [-70, -66, 16]])
+    points = np.concatenate([points, points[-1:] + 8.4e-8])
+    limits = {"velocity": [9.1, 31, 34], "acceleration": [39, 21, 41]}
+    done = plan(PlanRequest.of(points, limits=limits), "toppra")
+    slow = plan(PlanRequest.of(points, limits=limits), "time_scaled")
+    assert done.certificate.holds and done.trajectory.duration < 0.7 * slow.trajectory.duration
