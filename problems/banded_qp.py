@@ -29,6 +29,8 @@ class BandedQP:
     def hessian(self) -> csc_matrix:
         """Return H as a sparse matrix."""
         width, n = self.bands.shape
+        if not n:
+            return csc_matrix((0, 0))
         above = {k: self.bands[width - 1 - k, k:] for k in range(min(width, n))}
         both = {**above, **{-k: v for k, v in above.items()}}
         return csc_matrix(diags_array(list(both.values()), offsets=list(both), shape=(n, n)))

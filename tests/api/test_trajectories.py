@@ -285,3 +285,28 @@ def test_reading_is_quick():
         to_request(parse(PlanBody, decode(raw)), Caps())
         spent.append(time.perf_counter() - started)
     assert min(spent) < 1e-3
+
+
+def test_the_worked_cubic_spline_comes_out_of_the_service(service):
+    """(0, 0), (1, 2), (2, 3) clamped at rest: every figure follows by hand."""
+    body = {
+        "waypoints": [[0], [2], [3]],
+        "times": [0, 1, 2],
+        "method": "cubic_spline",
+        "sampling": {"times": [0, 0.5, 1, 1.5, 2]},
+        "include": ["samples", "polynomial"],
+    }
+    answer = plan(service, body).json()
+    powers = np.array(answer["polynomial"]["coefficients"])[:, :, 0]
+    np.testing.assert_allclose(powers.T, [[0, 0, 3.75, -1.75], [2, 2.25, -1.5, 0.25]], atol=1e-9)
+    samples = {k: np.array(v).reshape(5, -1)[:, 0] for k, v in answer["samples"].items()}
+    np.testing.assert_allclose(samples["position"], [0, 0.71875, 2, 2.78125, 3], atol=1e-9)
+    np.testing.assert_allclose(samples["velocity"], [0, 2.4375, 2.25, 0.9375, 0], atol=1e-9)
+    np.testing.assert_allclose(samples["acceleration"][[0, 2, 4]], [7.5, -3, -1.5], atol=1e-9)
+    np.testing.assert_allclose(samples["jerk"], [-10.5, -10.5, 1.5, 1.5, 1.5], atol=1e-9)
+    assert answer["certificate"]["cost"]["squared_jerk"] == pytest.approx(10.5**2 + 1.5**2)
+    natural = plan(service, {**body, "options": {"boundary": "natural"}}).json()
+    assert natural["samples"]["position"][1][0] == pytest.approx(1.09375, abs=1e-9)
+    given = {**body, "start": {"velocity": [1]}, "end": {"velocity": [-0.5]}}
+    powers = np.array(plan(service, given).json()["polynomial"]["coefficients"])[:, :, 0]
+    np.testing.assert_allclose(powers.T, [[0, 1, 1.875, -0.875], [2, 2.125, -0.75, -0.375]], atol=1e-9)
