@@ -26,16 +26,24 @@ Row = tuple[int, float, int, int]
 
 @dataclass(frozen=True, eq=False)
 class JointBounds:
-    """Bounds of the derivatives 0 … 3 on every gap, (4, M) each, scaled; ``unit`` (4,) and ``origin`` undo that."""
+    """Bounds of the derivatives 0 … 3 on every gap, (4, M) each, scaled.
+
+    ``unit`` (4,), ``origin`` and the caller's ``times`` (M + 1,) undo the scaling.
+    """
 
     lower: Array
     upper: Array
     unit: Array
     origin: float
+    times: Array
 
     def physical(self, order: int, value: float) -> float:
         """Return a scaled value in the caller's units."""
         return float(value * self.unit[order] + (self.origin if order == 0 else 0.0))
+
+    def clock(self, gap: int, u: float) -> float:
+        """Return the caller's time at a place in [0, 1] on a gap."""
+        return float(self.times[gap] + u * (self.times[gap + 1] - self.times[gap]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,7 @@ def least_relaxation(cuts: Cuts, deadline: Deadline) -> None:
         joint=cuts.joint,
         quantity=QUANTITIES[order],
         segment=gap,
-        time=None,
+        time=cuts.bounds.clock(gap, u),
         bound=cuts.bounds.physical(order, bound),
         needed=cuts.bounds.physical(order, needed),
         certified=True,

@@ -108,7 +108,9 @@ def _joint_bounds(request: PlanRequest, joint: int, second: float, unit: float) 
         offset = request.waypoints[0, joint] if order == 0 else 0.0
         lower[order] = (limit.lower[:, joint] - offset) * second**order / unit
         upper[order] = (limit.upper[:, joint] - offset) * second**order / unit
-    return JointBounds(lower, upper, np.array([unit / second**m for m in range(4)]), float(request.waypoints[0, joint]))
+    assert request.times is not None
+    units = np.array([unit / second**m for m in range(4)])
+    return JointBounds(lower, upper, units, float(request.waypoints[0, joint]), request.times)
 
 
 def _within_limits(cuts: Cuts, backend: str, deadline: Deadline) -> tuple[_Joint, str, int, float]:

@@ -125,6 +125,7 @@ def test_infeasible_is_proved_and_explained():
         plan(request, "minimum_jerk")
     found = caught.value
     assert found.certified and found.joint == 0 and found.quantity == "velocity" and abs(found.bound) == 1.2
+    assert found.segment in (0, 1) and found.segment <= found.time <= found.segment + 1
     wider = PlanRequest.of([0, 1, 0], times=[0, 1, 2], limits={"velocity": abs(found.needed) * (1 + 1e-5)})
     assert plan(wider, "minimum_jerk").certificate.holds
     with pytest.raises(Infeasible):
