@@ -69,7 +69,7 @@ def sample(trajectory: Trajectory, sampling: Sampling, most: int | None = None) 
     else:
         times = np.linspace(start, end, count, dtype=np.float64)
     times = np.clip(times, start, end)
-    return Samples(times, *(trajectory(times, order) for order in range(4)))
+    return Samples(times, *trajectory.states(times, 4))
 
 
 def refuse_too_many(count: int, dims: int, most: int | None) -> None:

@@ -179,18 +179,24 @@ class Trajectory:
         InvalidRequest
             A time is outside the trajectory (``out_of_range``) or not finite.
         """
+        return np.asarray(self.states(times, 1, order)[0])
+
+    def states(self, times: ArrayLike, orders: int = 4, first: int = 0) -> Array:
+        """Return the derivatives of order ``first`` … ``first + orders - 1`` at ``times``, shape (orders, …, D).
+
+        Raises
+        ------
+        InvalidRequest
+            As for a call.
+        """
+        from .kernels.evaluation import evaluate
+
         t = np.asarray(times, dtype=np.float64)
         if not ((t >= self.start) & (t <= self.end)).all():
             raise InvalidRequest.of("times", "out_of_range", f"times must lie in [{self.start!r}, {self.end!r}]")
-        flat = t.reshape(-1)
-        piece = np.clip(np.searchsorted(self.breaks, flat, side="right") - 1, 0, self.pieces - 1)
-        u = np.clip((flat - self.breaks[piece]) * self._rate[piece], 0.0, 1.0)
-        c = _differentiated(self.coefficients, order)
-        value = c[0][piece]
-        for k in range(1, len(c)):
-            value = value * u[:, None] + c[k][piece]
-        value = value * (self._rate[piece] ** order)[:, None]
-        return np.asarray(value.reshape(*t.shape, self.dims))
+        out = np.empty((orders, t.size, self.dims))
+        evaluate(self.breaks, self.coefficients, np.ascontiguousarray(t).reshape(-1), first, out)
+        return out.reshape(orders, *t.shape, self.dims)
 
     def derivative(self, order: int = 1) -> "Trajectory":
         """Return the derivative of the given order as a trajectory."""
