@@ -56,7 +56,8 @@ def check(client, seed, body, slow):
         for row in plan["certificate"]["checks"]:
             assert row["holds"], where
             if row["quantity"] in ("velocity", "acceleration", "jerk"):
-                assert row["ratio"] <= 1 + 1e-8, where
+                # phases of 1e-7 s on a clock of 10 s are known to 1e-8 only, and so are the derivatives there
+                assert row["ratio"] <= 1 + 1e-7, where
         assert plan["certificate"]["waypoint_error"] <= 1e-9, where
         trajectory = Trajectory.from_powers(plan["polynomial"]["breaks"], plan["polynomial"]["coefficients"])
         times = np.clip(plan["samples"]["time"], trajectory.start, trajectory.end)

@@ -99,11 +99,6 @@ class Cuts:
         where = np.stack([(found.at_high[:, :, 0] - t) / h, (found.at_low[:, :, 0] - t) / h])
         return np.stack([high, low]), np.clip(where, 0.0, 1.0)
 
-    def broken(self, y: Array) -> NDArray[np.bool_]:
-        """Return which bounds the motion breaks, (2, 4, M)."""
-        excess, _ = self._excess(y)
-        return np.asarray(excess > np.where(self._margin() > ROUNDING * self.scale(), 0.0, ROUNDING * self.scale()))
-
     def new_rows(self, y: Array) -> list[Row]:
         """Return a row for each bound that is not kept with half its margin."""
         excess, where = self._excess(y)

@@ -16,7 +16,7 @@ from problems.minimum_jerk import MinimumJerk
 
 from ..deadline import Deadline
 from ..errors import Infeasible, InvalidRequest, SolverFailed
-from ..limits import segment_bounds
+from ..limits import magnitude, segment_bounds
 from ..solvers import Backend, select
 from ..solvers.qp import solve_qp
 from ..trajectory import Trajectory
@@ -52,23 +52,16 @@ def minimum_jerk(request: PlanRequest, backend: str) -> Solution:
     problem = _statement(request, gaps / second, second, unit)
     programs = [problem.joint(d) for d in range(request.dims)]
     solved = [_Joint(p.free_minimum() if len(p.gradient) else np.zeros(0), np.zeros(0), p) for p in programs]
-    name, iterations, seconds = "block_elimination", 1, 0.0
-    bounds = [_joint_bounds(request, d, second, unit[d]) for d in range(request.dims)]
-    for d in range(request.dims):
-        cuts = Cuts(problem.only(d), d, bounds[d])
-        if backend == "auto" and not cuts.broken(solved[d].y).any():
-            continue
-        solved[d], name, rounds, spent = _within_limits(cuts, backend, deadline)
-        iterations, seconds = iterations + rounds, seconds + spent
-    y = np.stack([s.y for s in solved], axis=1)
-    velocity, acceleration = problem.states(y)
-    trajectory = Trajectory.from_hermite(
-        request.times, request.waypoints, velocity * unit / second, acceleration * unit / second**2
-    )
+    stats = Stats("block_elimination")
+    free = _trajectory(request, problem, solved, second, unit)
+    for d in (int(i) for i in np.flatnonzero(_broken(free, request) | (backend != "auto"))):
+        cuts = Cuts(problem.only(d), d, _joint_bounds(request, d, second, unit[d]))
+        solved[d], name, rounds, seconds = _within_limits(cuts, backend, deadline)
+        before = stats.iterations if stats.name != "block_elimination" else 0
+        stats = Stats(name, "solved", before + rounds, stats.seconds + seconds)
     evidence = DualPoint(tuple(s.program for s in solved), tuple(s.z for s in solved), unit**2 / second**5)
-    return Solution(
-        trajectory, request.times, Stats(name, "solved", iterations, seconds), bound=Bound("method", evidence)
-    )
+    trajectory = _trajectory(request, problem, solved, second, unit)
+    return Solution(trajectory, request.times, stats, bound=Bound("method", evidence))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +71,29 @@ class _Joint:
     y: Array
     z: Array
     program: BandedQP
+
+
+def _trajectory(
+    request: PlanRequest, problem: MinimumJerk, solved: Sequence[_Joint], second: float, unit: Array
+) -> Trajectory:
+    """Return the joints' node states as the trajectory in the caller's units."""
+    assert request.times is not None
+    velocity, acceleration = problem.states(np.stack([s.y for s in solved], axis=1))
+    return Trajectory.from_hermite(
+        request.times, request.waypoints, velocity * unit / second, acceleration * unit / second**2
+    )
+
+
+def _broken(trajectory: Trajectory, request: PlanRequest) -> NDArray[np.bool_]:
+    """Return which joints break a limit by more than rounding, (D,)."""
+    found = trajectory.extrema(4)
+    broken = np.zeros(request.dims, dtype=bool)
+    for order in range(4):
+        limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
+        slack = 1e-12 * magnitude(limit.lower, limit.upper)
+        over = (found.high[order] > limit.upper + slack) | (found.low[order] < limit.lower - slack)
+        broken |= over.any(axis=0)
+    return broken
 
 
 def _refuse_uneven(gaps: Array) -> None:
