@@ -77,7 +77,8 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
             raise Unsupported(row.id, "precision", reason=reason)
         raise NotVerified(row.id, asdict(judged))
     done = time.perf_counter()
-    pose = max(solved - checked - solution.stats.seconds, 0.0)
+    inside = solution.stats.seconds  # 0: the method has no solver to tell apart, all of it is solving
+    pose = max(solved - checked - inside, 0.0) if inside else 0.0
     return Plan(
         row.id,
         because,

@@ -63,7 +63,7 @@ def time_optimal(segment: Segment) -> Trajectory:
         except SolverFailed:
             if cap == CAPS[-1]:
                 raise
-    pieces = _pieces(duration, phases, scaled)
+    pieces = _pieces(duration, phases)
     coefficients = pieces.coefficients * unit
     coefficients[-1] += segment.p0
     return Trajectory(pieces.breaks * second, coefficients)
@@ -109,8 +109,11 @@ def _scaled(s: Segment, second: float, unit: Array, cap: float) -> Segment:
     )
 
 
-def _ruckig(s: Segment) -> tuple[float, list[list[tuple[float, float, float, float, float]]]]:
-    """Return the duration and, per joint, the phases (duration, position, velocity, acceleration, jerk)."""
+def _ruckig(s: Segment) -> tuple[float, Array]:
+    """Return the duration and every joint's phases, (D, 10, 5): duration, position, velocity, acceleration, jerk.
+
+    Two of braking, seven of motion, and the rest at the end; some take no time.
+    """
     import ruckig
 
     dims = len(s.p0)
@@ -130,41 +133,28 @@ def _ruckig(s: Segment) -> tuple[float, list[list[tuple[float, float, float, flo
         raise SolverFailed("ruckig", str(error).strip().splitlines()[0][:300]) from None
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise SolverFailed("ruckig", str(result))
-    phases = []
-    for profile in made.profiles[0]:
-        braking = zip(profile.brake.t, profile.brake.p, profile.brake.v, profile.brake.a, profile.brake.j, strict=True)
-        main = zip(profile.t, profile.p, profile.v, profile.a, profile.j, strict=False)
-        phases.append([p for p in (*braking, *main) if p[0] > 0.0])
+    phases = np.zeros((dims, 10, 5))
+    for d, profile in enumerate(made.profiles[0]):
+        brake = profile.brake
+        phases[d, :2] = np.array([brake.t, brake.p, brake.v, brake.a, brake.j]).T
+        phases[d, 2:9] = np.array([profile.t, profile.p[:7], profile.v[:7], profile.a[:7], profile.j]).T
+    phases[:, 9, 0], phases[:, 9, 1] = np.inf, s.p1
     return float(made.duration), phases
 
 
-def _pieces(duration: float, phases: list[list[tuple[float, float, float, float, float]]], s: Segment) -> Trajectory:
+def _pieces(duration: float, phases: Array) -> Trajectory:
     """Return the joints' phases on common breaks; breaks closer than rounding are one."""
-    ends = [np.cumsum([p[0] for p in joint]) for joint in phases]
-    found = np.unique(np.concatenate([[0.0], *ends]))
+    ends = np.cumsum(phases[:, :, 0], axis=1)
+    found = np.unique(np.append(ends[:, :9], 0.0))
     found = found[found < duration * (1.0 - 1e-12)]
-    breaks = np.append(found[np.concatenate([[True], np.diff(found) > 1e-12 * duration])], duration)
-    h = np.diff(breaks)
-    powers = np.zeros((4, len(h), len(phases)))
-    for d, joint in enumerate(phases):
-        if not joint:  # this joint does not move
-            powers[0, :, d] = s.p0[d]
-            continue
-        table = np.array(joint)
-        starts = np.concatenate([[0.0], ends[d][:-1]])
-        row = np.clip(np.searchsorted(ends[d], breaks[:-1] + 0.5 * h, side="right"), 0, len(table) - 1)
-        _, p, v, a, j = table[row].T
-        u = breaks[:-1] - starts[row]
-        done = breaks[:-1] + 0.5 * h > ends[d][-1]  # past the end by rounding: stay
-        powers[:, :, d] = (
-            p + u * (v + u * (a / 2 + u * j / 6)),
-            v + u * (a + u * j / 2),
-            (a + u * j) / 2,
-            j / 6,
-        )
-        powers[1:, done, d] = 0.0
-        powers[0, done, d] = s.p1[d]
-    return Trajectory.from_powers(breaks, powers)
+    breaks = np.append(found[np.append(True, np.diff(found) > 1e-12 * duration)], duration)
+    middles = 0.5 * (breaks[:-1] + breaks[1:])
+    phase = (ends[:, :9, None] <= middles).sum(axis=1)  # (D, K)
+    starts = np.concatenate([np.zeros((len(ends), 1)), ends[:, :9]], axis=1)
+    u = breaks[:-1] - np.take_along_axis(starts, phase, axis=1)
+    p, v, a, j = (np.take_along_axis(phases[:, :, k], phase, axis=1) for k in range(1, 5))
+    powers = (p + u * (v + u * (a / 2 + u * j / 6)), v + u * (a + u * j / 2), (a + u * j) / 2, j / 6)
+    return Trajectory.from_powers(breaks, np.stack(powers).transpose(0, 2, 1))
 
 
 def refuse_overshoot(segment: Segment, motion: Trajectory, index: int) -> None:
