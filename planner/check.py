@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 #: Waypoints closer than this, relative to their range, cannot be told apart.
 SAME = 1e-12
+#: A whole motion smaller than this underflows in its derivatives.
+TINY = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,9 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     _refuse_unsupported(request, method, can, methods)
     _require(request, can)
     notes = []
+    if 0 < np.ptp(request.waypoints, axis=0).max() < TINY:
+        request = replace(request, waypoints=np.broadcast_to(request.waypoints[0], request.waypoints.shape).copy())
+        notes.append(Note("moves_snapped", f"all waypoints lie within {TINY:g} of one another and were made equal"))
     if request.times is None and can.timing != "parameter" and not options.fixes_knots:
         request, kept = _merged(request)
         if len(request.waypoints) < len(kept):

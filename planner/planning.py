@@ -63,7 +63,7 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
     asked = check(request, row, chosen, METHODS.values())
     checked = time.perf_counter()
     with np.errstate(all="ignore"):  # what overflows does not verify
-        solution = hold(asked) if asked.still else row.solve(asked.request, chosen)
+        solution = hold(asked) if asked.still else _solve(row, asked.request, chosen)
     solved = time.perf_counter()
     if request.timeout is not None and solved - started > request.timeout:
         raise TimeLimit(request.timeout)
@@ -91,6 +91,19 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
         asked.notes + solution.notes,
         {"validate": checked - started, "pose": pose, "solve": solved - checked - pose, "verify": done - solved},
     )
+
+
+def _solve(row: Method, request: PlanRequest, options: Options) -> Solution:
+    try:
+        return row.solve(request, options)
+    except InvalidRequest as error:
+        if error.errors[0].field:
+            raise
+        # no field of the caller's: a trajectory on the way was not one, which only extreme numbers bring about
+        reason = f"the numbers of this request lead beyond double precision: {error.errors[0].reason}"
+    except OverflowError as error:
+        reason = f"the numbers of this request lead beyond double precision: {error}"
+    raise Unsupported(row.id, "precision", reason=reason)
 
 
 def pick(request: PlanRequest, method: str) -> tuple[Method, str | None]:

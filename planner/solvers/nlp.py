@@ -47,7 +47,10 @@ def solve_nlp(problem: dict[str, Any], backend: Backend, time_limit: float | Non
     )
     constraints = ca.Function("g", [problem["x"]], [problem["g"]])
     started = time.perf_counter()
-    answer = solver(**{k: problem[k] for k in ("x0", "lbx", "ubx", "lbg", "ubg")})
+    try:
+        answer = solver(**{k: problem[k] for k in ("x0", "lbx", "ubx", "lbg", "ubg")})
+    except RuntimeError as error:  # CasADi's word for a program with NaN in it
+        raise SolverFailed(backend.name, str(error).strip().splitlines()[-1][:300]) from None
     seconds = time.perf_counter() - started
     stats = solver.stats()
     status = str(stats["return_status"])

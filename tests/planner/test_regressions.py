@@ -46,6 +46,9 @@ def test_noise_in_a_joint_that_rests_is_no_jump():
         ("cubic_spline", {"waypoints": [0.9, -1, -0.18], "times": [0, 1e-6, 1000000.000001]}),
         ("trapezoidal", {"waypoints": [-0.9, -2.9], "limits": {"acceleration": 1.3, "velocity": 1e-6}}),
         ("ruckig", {"waypoints": [1.1, -1e9, 0.3], "limits": {"acceleration": 1, "velocity": 1e-6, "jerk": 1e6}}),
+        ("ruckig", {"waypoints": [1e9, 1e9, 0.8], "limits": {"velocity": 1.7, "acceleration": 1e-300}}),
+        ("toppra", {"waypoints": [0, 1e-300], "limits": {"acceleration": 0.4}}),
+        ("time_optimal_nlp", {"waypoints": [0, 1, 1e9], "limits": {"acceleration": 1e-300}}),
         ("toppra", {"waypoints": [0, -1, 1e9, 1e-300, 1e9, 1, -1e9], "limits": {"acceleration": 1e6, "velocity": 1e9}}),
     ],
 )  # fmt: skip
