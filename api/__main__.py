@@ -140,8 +140,9 @@ def _plan(arguments: argparse.Namespace) -> int:
     if isinstance(value, dict):
         if arguments.method is not None:
             value["method"] = arguments.method
-        if arguments.option:
-            value["options"] = {**(value.get("options") or {}), **dict(_option(text) for text in arguments.option)}
+        options = {} if value.get("options") is None else value["options"]
+        if arguments.option and isinstance(options, dict):  # what is no object is refused with the rest
+            value["options"] = {**options, **dict(_option(text) for text in arguments.option)}
     answer = answer_plan(parse(PlanBody, value), LOCAL, media_type)
     if arguments.out is not None:
         _write(Path(arguments.out), answer.content)
@@ -168,6 +169,16 @@ def _option(text: str) -> tuple[str, Any]:
 
 def _write(path: Path, content: bytes) -> None:
     """Write a file in full or not at all."""
+    try:
+        _replace(path, content)
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError) as error:
+        raise Usage(f"{path}: {error.strerror or error}") from None
+    except OSError as error:  # it names the temporary file
+        error.filename, error.filename2 = str(path), None
+        raise
+
+
+def _replace(path: Path, content: bytes) -> None:
     handle, partial = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:

@@ -130,6 +130,7 @@ class RowReply(Reply):
     peaks: dict[str, list[float | None]] | None = Field(description="Largest magnitudes per joint; null: unbounded")
     certificate: CertificateReply | None = Field(description="What its trajectory was found to keep")
     samples: SamplesReply | None = Field(None, description="Where samples are included")
+    polynomial: PolynomialReply | None = Field(None, description="Where the polynomial is included")
     error: Problem | None = Field(None, description="Why it refused")
     compute_ms: float = Field(description="Time taken, ms; the one figure that differs from run to run")
 

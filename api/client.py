@@ -89,7 +89,10 @@ class Client:
         include: Sequence[str] = (),
         **given: Unpack[Given],
     ) -> list[dict[str, Any]]:
-        """Return one row per method (``all``, or ids or pairs (id, options)); a row that refuses has an ``error``."""
+        """Return one row per method (``all``, or ids or pairs (id, options)); a row that refuses has an ``error``.
+
+        Rows hold ``samples`` and ``polynomial`` only where ``include`` asks for them.
+        """
         return wire.read_rows(self._call(wire.compare_call(waypoints, methods, given, include)))
 
     def certify(

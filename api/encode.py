@@ -153,15 +153,15 @@ def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\r\n') else name
 
 
-def to_ros2(samples: Samples, joint_names: tuple[str, ...] | None) -> bytes:
-    """Return a trajectory_msgs/JointTrajectory whose times start at 0 and increase strictly.
+def to_ros2(samples: Samples, joint_names: tuple[str, ...] | None, start: float) -> bytes:
+    """Return a trajectory_msgs/JointTrajectory whose times count from the trajectory's start and increase strictly.
 
     Raises
     ------
     InvalidRequest
         Two samples fall on the same nanosecond, or one lies beyond the 2^31 s that the message can hold.
     """
-    elapsed = samples.time - samples.time[0]
+    elapsed = samples.time - start
     if elapsed[-1] >= 2**31:
         raise InvalidRequest.of("/sampling", "out_of_range", "a ROS 2 duration holds less than 2^31 s")
     times = np.round(elapsed * 1e9).astype(np.int64)

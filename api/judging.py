@@ -12,7 +12,10 @@ from .schemas import CertifyBody, PolynomialBody, SamplesBody
 from .settings import Caps
 
 #: Highest degree of a caller's polynomial; a quintic path under a jerk-limited law has 15.
-MAX_DEGREE = 31
+MAX_DEGREE = 15
+
+#: Largest rounding of a polynomial's values that is judged, relative to max(1, the range of its values at the breaks).
+NOISE = 1e-7
 
 _POLYNOMIAL = "/trajectory/polynomial"
 _SAMPLES = "/trajectory/samples"
@@ -83,4 +86,22 @@ def _polynomial(polynomial: PolynomialBody, caps: Caps) -> Trajectory:
         raise InvalidRequest.of(where, "out_of_range", f"its values must stay within ±{MAX_VALUE:g}") from None
     if not float(trajectory.extrema(1).peak(0).max()) <= MAX_VALUE:
         raise InvalidRequest.of(where, "out_of_range", f"its values must stay within ±{MAX_VALUE:g}")
+    _refuse_cancellation(trajectory, where)
     return trajectory
+
+
+def _refuse_cancellation(trajectory: Trajectory, where: str) -> None:
+    """Refuse coefficients that cancel so strongly that the values are rounding: no verdict on them would mean a thing.
+
+    The constant terms are left out: they are values of the trajectory and cancel nothing.
+    """
+    sums = np.abs(trajectory.coefficients[:-1]).sum(axis=0)
+    noise = np.finfo(float).eps * float(sums.max(initial=0.0))
+    at_breaks = np.concatenate(trajectory.ends(0))
+    allowed = NOISE * max(1.0, float(np.ptp(at_breaks, axis=0).max()))
+    if noise > allowed:
+        reason = (
+            f"they cancel so strongly that the values are known only to {noise:.1g}, {allowed:.1g} is needed: "
+            "use shorter pieces or a lower degree"
+        )
+        raise InvalidRequest.of(where, "out_of_range", reason)

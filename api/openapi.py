@@ -37,7 +37,7 @@ class Operation:
     many: bool = False
     body: tuple[type[BaseModel], ...] = ()
     formats: tuple[str, ...] = (JSON,)
-    errors: tuple[str, ...] = ("not_acceptable",)
+    errors: tuple[str, ...] = ("invalid_request", "not_acceptable")
     parameters: tuple[dict[str, Any], ...] = ()
     example: Any = None
 
@@ -83,19 +83,19 @@ OPERATIONS: dict[str, Operation] = {
     "method": Operation(
         "discovery",
         a.MethodReply,
-        errors=("unknown_method", "not_acceptable"),
+        errors=("invalid_request", "unknown_method", "not_acceptable"),
         parameters=(_parameter("id", "path", "The method's id"),),
     ),
     "cases": Operation("discovery", a.CaseReply, many=True),
     "limits": Operation("discovery", a.LimitsReply),
     "version": Operation("discovery", a.VersionReply),
-    "healthz": Operation("health", a.StatusReply, errors=()),
-    "readyz": Operation("health", a.StatusReply, errors=("overloaded",)),
+    "healthz": Operation("health", a.StatusReply, errors=("invalid_request",)),
+    "readyz": Operation("health", a.StatusReply, errors=("invalid_request", "overloaded")),
     "explain": Operation(
         "discovery",
         a.ExplanationReply,
         formats=(JSON, "text/markdown"),
-        errors=("not_found", "not_acceptable"),
+        errors=("invalid_request", "not_found", "not_acceptable"),
         parameters=(_parameter("code", "path", "The last part of a problem's type", enum=list(KINDS)),),
     ),
 }

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ValidationError
 
 from planner import FieldError, InvalidRequest, PlanRequest, Sampling, TooLarge, invalid, pointer, sample_count
 
-from .schemas import MotionBody
+from .schemas import CompareBody, MotionBody
 from .settings import Caps
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -65,8 +65,9 @@ def refuse_above(count: int, most: int, what: str) -> None:
 
 
 def included(body: MotionBody) -> tuple[str, ...]:
-    """Return what the answer is to hold, in one order."""
-    asked = {"samples"} if body.include is None else set(body.include)
+    """Return what the answer is to hold, in one order: by default the samples, in a comparison nothing."""
+    default = () if isinstance(body, CompareBody) else ("samples",)
+    asked = default if body.include is None else body.include
     return tuple(name for name in ("samples", "polynomial", "bound") if name in asked)
 
 
@@ -88,7 +89,7 @@ def to_request(body: MotionBody, caps: Caps, share: int = 1) -> tuple[PlanReques
     names = {f.name for f in fields(PlanRequest)} & type(body).model_fields.keys() - _OURS
     given = body.model_dump(include=names, exclude_none=True)
     given["timeout"] = caps.timeout if body.timeout is None else body.timeout
-    request = PlanRequest.of(body.waypoints, **given, bound="bound" in included(body))
+    request = PlanRequest.of(body.waypoints, **given)
     sampling = Sampling.of(None if body.sampling is None else body.sampling.model_dump(exclude_none=True))
     if "samples" in included(body):
         _refuse_samples(request, sampling, caps.samples // share)

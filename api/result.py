@@ -35,15 +35,13 @@ class Result:
     @classmethod
     def of(cls, answer: Mapping[str, Any]) -> "Result":
         """Read a plan answer."""
-        polynomial, times = answer.get("polynomial"), answer["waypoint_times"]
+        times = answer["waypoint_times"]
         return cls(
             method=answer["method"],
             duration=answer["duration"],
             waypoint_times=None if times is None else np.array(times, dtype=np.float64),
             samples=read_samples(answer.get("samples")),
-            polynomial=None
-            if polynomial is None
-            else Trajectory.from_powers(polynomial["breaks"], polynomial["coefficients"]),
+            polynomial=read_polynomial(answer.get("polynomial")),
             certificate=answer["certificate"],
             solver=answer["solver"],
             warnings=tuple(answer["warnings"]),
@@ -78,6 +76,11 @@ class Result:
         panels[0].set_title(f"{self.method}, {self.duration:.4g} s")
         panels[-1].set_xlabel("time, s")
         return figure
+
+
+def read_polynomial(tree: Mapping[str, Any] | None) -> Trajectory | None:
+    """Return the exact pieces of an answer as a trajectory."""
+    return None if tree is None else Trajectory.from_powers(tree["breaks"], tree["coefficients"])
 
 
 def read_samples(tree: Mapping[str, Any] | None) -> Samples | None:

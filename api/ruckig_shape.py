@@ -55,7 +55,9 @@ class RuckigBody(Body):
 
 
 def to_plan(body: RuckigBody) -> PlanBody:
-    """Return the plan request that says the same, method ``auto``.
+    """Return the plan request that says the same: method ``auto``, without a jerk limit ``ruckig``.
+
+    There ``auto`` would pick a method on a path, which honours no end states.
 
     Raises
     ------
@@ -70,6 +72,7 @@ def to_plan(body: RuckigBody) -> PlanBody:
     sections = len(waypoints) - 1
     value = {
         "waypoints": waypoints,
+        "method": "auto" if any(bound is not None for bound in body.max_jerk or ()) else "ruckig",
         "limits": _limits(body, "", None),
         "segment_limits": _segments(body, sections),
         "segment_durations": _durations(body, sections),

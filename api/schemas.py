@@ -174,6 +174,9 @@ class CompareBody(MotionBody):
     methods: Annotated[
         Annotated[Literal["all"], Tag("#all")] | Annotated[Choices, Tag("#list")], Discriminator(_methods_kind)
     ] = Field(description="all, or 1 to 64 entries: an id of /v1/methods or an object with options")
+    include: Annotated[list[Included], Field(max_length=16)] | None = Field(
+        None, description="What the rows hold besides the certificate; by default nothing"
+    )
 
 
 class PolynomialBody(Body):

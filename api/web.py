@@ -38,12 +38,26 @@ async def read_json(
     """
     raw = await _body(request, caps_of(request).body_bytes)
     _refuse_media_type(request)
-    unknown = [name for name in request.query_params if name not in known_query]
+    _refuse_query(request, known_query)
+    return raw, choose(request.headers.get("accept"), formats)
+
+
+async def no_query(request: Request) -> None:
+    """Refuse query parameters: a dependency of the routes that take none.
+
+    Raises
+    ------
+    InvalidRequest
+    """
+    _refuse_query(request, ())
+
+
+def _refuse_query(request: Request, known: Sequence[str]) -> None:
+    unknown = [name for name in request.query_params if name not in known]
     if unknown:
         raise InvalidRequest(
             [FieldError(pointer((f"?{name[:60]}",)), "unknown_field", "there is no such parameter") for name in unknown]
         )
-    return raw, choose(request.headers.get("accept"), formats)
 
 
 async def _body(request: Request, most: int) -> bytes:

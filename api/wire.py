@@ -13,7 +13,7 @@ import orjson
 
 from planner import InvalidRequest, PlannerError, Samples, Trajectory, pointer, rebuild
 
-from .result import Result, read_samples
+from .result import Result, read_polynomial, read_samples
 
 _HEAD = ("type", "title", "status", "detail", "instance", "request_id")
 
@@ -124,8 +124,9 @@ def problem_error(document: Mapping[str, Any], status: int | None = None) -> Pla
 
 
 def read_rows(tree: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of a comparison, samples as arrays."""
-    return [{**row, "samples": read_samples(row["samples"])} if row.get("samples") else row for row in tree["rows"]]
+    """Return the rows of a comparison, samples as arrays and polynomials as trajectories."""
+    readers = {"samples": read_samples, "polynomial": read_polynomial}
+    return [{k: readers[k](v) if k in readers else v for k, v in row.items()} for row in tree["rows"]]
 
 
 def wait_before_retry(status: int, headers: Mapping[str, str], attempt: int, remaining: float) -> float | None:

@@ -47,8 +47,11 @@ def answer_plan(body: PlanBody, caps: Caps, media_type: str = encode.JSON) -> An
     samples = sample(made.trajectory, sampling, caps.samples) if "samples" in include else None
     if samples is not None and media_type != encode.JSON:
         encode.refuse_infinite(made.method, *encode.samples_tree(samples).values())
-        write = {encode.CSV: encode.to_csv, encode.ROS2: encode.to_ros2}[media_type]
-        content = write(samples, request.joint_names)
+        content = (
+            encode.to_csv(samples, request.joint_names)
+            if media_type == encode.CSV
+            else encode.to_ros2(samples, request.joint_names, made.trajectory.start)
+        )
     else:
         given = body.model_dump(exclude=_CANONICAL, exclude_none=True)
         digest = encode.digest_of(made, method, sampling, include, given)
@@ -71,15 +74,15 @@ def comparison(body: CompareBody, caps: Caps, problem: ProblemOf) -> dict[str, A
     share = len(METHODS) if isinstance(methods, str) else len(methods)
     request, sampling = to_request(body, caps, share)
     rows = compare(request, methods)
-    wanted = sampling if "samples" in included(body) else None
-    return {"rows": [_row(row, wanted, caps.samples // share, problem) for row in rows]}
+    include = included(body)
+    return {"rows": [_row(row, include, sampling, caps.samples // share, problem) for row in rows]}
 
 
 def _entry(choice: str | MethodChoice) -> str | tuple[str, Mapping[str, Any]]:
     return choice if isinstance(choice, str) else (choice.method, choice.options or {})
 
 
-def _row(row: Row, sampling: Sampling | None, most: int, problem: ProblemOf) -> dict[str, Any]:
+def _row(row: Row, include: tuple[str, ...], sampling: Sampling, most: int, problem: ProblemOf) -> dict[str, Any]:
     try:
         if row.plan is None:
             raise row.error or PlannerError("no answer")
@@ -92,10 +95,12 @@ def _row(row: Row, sampling: Sampling | None, most: int, problem: ProblemOf) -> 
             "peaks": encode.peaks_tree(made.certificate),
             "certificate": encode.certificate_tree(made.certificate),
         }
-        if sampling is not None:
-            samples = encode.samples_tree(sample(made.trajectory, sampling, most))
-            encode.refuse_infinite(row.method, *samples.values())
-            tree["samples"] = samples
+        if "samples" in include:
+            tree["samples"] = encode.samples_tree(sample(made.trajectory, sampling, most))
+        if "polynomial" in include:
+            tree["polynomial"] = encode.polynomial_tree(made.trajectory)
+        arrays = [*tree.get("samples", {}).values(), *tree.get("polynomial", {}).values()]
+        encode.refuse_infinite(row.method, *arrays)
     except PlannerError as error:
         nothing = dict.fromkeys(("duration", "cost", "peaks", "certificate"))
         tree = {"method": row.method, "ok": False, **nothing, "error": problem(error)}

@@ -57,7 +57,8 @@ def certify(
     """Return what a trajectory keeps of limits, waypoints and end states, also where it does not hold.
 
     Waypoints without times are to be passed in this order at any times. Samples are judged by divided differences:
-    every smooth curve through them takes, somewhere between the samples, the values reported.
+    every smooth curve through them takes, somewhere between the samples, the values reported; sent velocities and
+    accelerations are held to the limits too, and must agree with the positions.
 
     Parameters
     ----------
@@ -96,13 +97,13 @@ def certify(
 
 
 #: Grid points looked at together, and how many waypoints may be missed before the rest is not looked for.
-_WINDOW, _MISSES = 512, 20
+_WINDOW, _MISSES = 512, 3
 
 
 def _passing_times(trajectory: Trajectory, points: Array) -> Array:
     """Return when the waypoints are passed, in order: each at the earliest time that comes within the tolerance.
 
-    Where none does, the nearest approach counts; after 20 misses (the certificate fails anyway) the rest are put at
+    Where none does, the nearest approach counts; after 3 misses (the certificate fails anyway) the rest are put at
     the end.
     """
     degree = max(trajectory.degree, 1)
@@ -133,35 +134,30 @@ def _next_pass(
         distance = np.linalg.norm(values[first : last + 1] - point, axis=1)
         padded = np.concatenate([[np.inf], distance, [np.inf]])
         dips = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
-        for k in dips:
-            left, right = first + max(int(k) - 1, 0), min(first + int(k) + 1, len(grid) - 1)
-            time, miss = _closest(trajectory, point, max(float(grid[left]), begin), float(grid[right]))
-            if miss < best:
-                best_time, best = time, miss
-            if best <= tolerance:
-                break
+        left, right = grid[first + np.maximum(dips - 1, 0)], grid[np.minimum(first + dips + 1, len(grid) - 1)]
+        found, miss = _closest(trajectory, point, np.maximum(left, begin), np.maximum(right, begin))
+        near = np.flatnonzero(miss <= tolerance)
+        k = int(near[0]) if len(near) else int(np.argmin(miss))
+        if miss[k] < best:
+            best_time, best = float(found[k]), float(miss[k])
         first = last
     return best_time, best
 
 
-def _closest(trajectory: Trajectory, point: Array, left: float, right: float) -> tuple[float, float]:
-    """Return a time of least distance in [left, right], by Gauss-Newton steps kept inside, and the distance."""
+def _closest(trajectory: Trajectory, point: Array, left: Array, right: Array) -> tuple[Array, Array]:
+    """Return the times of least distance in the intervals, by Gauss-Newton steps kept inside, and the distances."""
     time = 0.5 * (left + right)
-    best_time, best = time, np.inf
-    for _ in range(12):
-        off, rate = trajectory(time) - point, trajectory(time, 1)
-        distance, speed = float(np.linalg.norm(off)), float(rate @ rate)
-        if distance < best:
-            best_time, best = time, distance
-        step = -float(off @ rate) / speed if speed > 0 else 0.0
-        moved = min(max(time + step, left), right)
-        if moved == time:
-            break
-        time = moved
-    for end in (left, right):
-        distance = float(np.linalg.norm(trajectory(end) - point))
-        if distance < best:
-            best_time, best = end, distance
+    best_time, best = time, np.full(len(time), np.inf)
+    for step in range(14):
+        if step >= 12:  # the ends, last
+            time = left if step == 12 else right
+        position, rate = trajectory.states(time, 2)
+        off = position - point
+        distance = np.linalg.norm(off, axis=1)
+        best_time, best = np.where(distance < best, time, best_time), np.minimum(distance, best)
+        speed = (rate**2).sum(axis=1)
+        move = np.divide(-(off * rate).sum(axis=1), speed, out=np.zeros_like(speed), where=speed > 0)
+        time = np.clip(time + move, left, right)
     return best_time, best
 
 
@@ -172,8 +168,8 @@ def _certify_samples(recorded: Recorded, demands: Demands) -> Certificate:
         passing = _passing_times(polyline, demands.waypoints)
     whole = verify(polyline, replace(demands, limits=Limits(), start=Boundary(), end=Boundary()), passing)
     differences = _divided_differences(recorded)
-    checks = [row for order in range(4) if (row := _difference_row(differences, demands, order)) is not None]
-    checks += _sent_rows(recorded, differences)
+    checks = [row for order in range(4) if (row := _difference_row(recorded, differences, demands, order)) is not None]
+    checks += _sent_rows(recorded)
     boundary_error = _sampled_boundary(recorded, demands, differences)
     errors = (whole.waypoint_error, boundary_error)
     squared = None
@@ -211,13 +207,19 @@ def _edges(at: Array, times: Array) -> Array:
     return np.concatenate([times[:1], 0.5 * (at[:-1] + at[1:]), times[-1:]])
 
 
-def _difference_row(differences: list[tuple[Array, Array]], demands: Demands, order: int) -> Check | None:
+def _difference_row(
+    recorded: Recorded, differences: list[tuple[Array, Array]], demands: Demands, order: int
+) -> Check | None:
+    """Return the worst of the differences, and of what was sent for this derivative, against its limit."""
     limit = getattr(demands.limits, QUANTITIES[order])
     if limit is None:
         return None
     if order >= len(differences):
         return Check(QUANTITIES[order], None, None, None, None, None, None, False)
     at, values = differences[order]
+    sent = {1: recorded.velocity, 2: recorded.acceleration}.get(order)
+    if sent is not None:
+        at, values = np.concatenate([at, recorded.time]), np.concatenate([values, sent])
     scale = limit.scale()
     excess = np.stack([(values - limit.upper) / scale, (limit.lower - values) / scale])
     side, row, joint = (int(i) for i in np.unravel_index(int(np.argmax(excess)), excess.shape))
@@ -228,37 +230,44 @@ def _difference_row(differences: list[tuple[Array, Array]], demands: Demands, or
         middle = 0.5 * (limit.upper[joint] + limit.lower[joint])
         ratio = float(abs(value - middle) / half) if np.isfinite(half) else None
     segment = None
-    if demands.times is not None:
+    if demands.times is not None and len(demands.times) > 1:
         segment = int(np.clip(np.searchsorted(demands.times, at[row], side="right") - 1, 0, len(demands.times) - 2))
     holds = bool(excess.max() <= TOLERANCE)
     return Check(QUANTITIES[order], joint, segment, float(at[row]), value, bound, ratio, holds)
 
 
-def _sent_rows(recorded: Recorded, differences: list[tuple[Array, Array]]) -> list[Check]:
-    """Return whether sent derivatives agree with the positions: the mean of neighbours against the difference.
+def _sent_rows(recorded: Recorded) -> list[Check]:
+    """Return whether sent derivatives agree with what they are derivatives of, at the inner samples.
 
-    The trapezoidal rule is off by h² / 12 times the second derivative of what is averaged; four times that estimate,
-    plus 1e-6 of the peak, is allowed.
+    The parabola through three neighbours has the slope (h1 d0 + h0 d1) / (h0 + h1) in the middle, off by
+    h0 h1 / 6 times the third derivative. That is taken from the third differences around, four times over; the sent
+    values themselves have no part in it.
     """
-    rows = []
-    h = np.diff(recorded.time)[:, None]
-    sent_by_order = ((1, recorded.velocity), (2, recorded.acceleration))
-    below: Array | None = recorded.position
-    for order, sent in sent_by_order:
-        if sent is not None and below is not None:
-            slope = np.diff(below, axis=0) / h
-            off = np.abs(0.5 * (sent[:-1] + sent[1:]) - slope)
-            bend = (
-                np.abs(np.diff(sent, 2, axis=0)).max(axis=0, initial=0.0) if len(sent) > 2 else np.zeros(off.shape[1])
-            )
-            allowed = bend / 3.0 + TOLERANCE * np.maximum(np.abs(sent).max(axis=0), 1e-12)
+    rows: list[Check] = []
+    t = recorded.time
+    if len(t) < 4:
+        return rows
+    h = np.diff(t)[:, None]
+    base = recorded.position
+    for order, sent in ((1, recorded.velocity), (2, recorded.acceleration)):
+        if sent is not None:
+            for _ in range(1 if order == 1 or recorded.velocity is not None else 2):
+                slopes = np.diff(base, axis=0) / h
+                middle = (h[1:] * slopes[:-1] + h[:-1] * slopes[1:]) / (h[1:] + h[:-1])
+                second = np.diff(slopes, axis=0) / (0.5 * (h[1:] + h[:-1]))
+                third = np.abs(np.diff(second, axis=0)) / h[1:-1]
+                around = np.concatenate([third[:1], third, third[-1:]])
+                around = np.maximum(around[:-1], around[1:])
+                base = np.concatenate([slopes[:1], middle, slopes[-1:]])
+            off = np.abs(sent[1:-1] - middle)
+            allowed = 4.0 * around * h[1:] * h[:-1] / 6.0 * (1 if order == 1 or recorded.velocity is not None else 9)
+            allowed = allowed + TOLERANCE * np.maximum(np.abs(middle).max(axis=0), 1e-9)
             ratio = off / allowed
             row, joint = (int(i) for i in np.unravel_index(int(np.argmax(ratio)), ratio.shape))
-            name = f"sent_{QUANTITIES[order]}"
-            time, worst = float(recorded.time[row]), float(ratio[row, joint])
-            value, bound = float(off[row, joint]), float(allowed[joint])
-            rows.append(Check(name, joint, None, time, value, bound, worst, worst <= 1.0))
-        below = sent
+            name, worst = f"sent_{QUANTITIES[order]}", float(ratio[row, joint])
+            value, bound = float(off[row, joint]), float(allowed[row, joint])
+            rows.append(Check(name, joint, None, float(t[row + 1]), value, bound, worst, worst <= 1.0))
+        base = sent if sent is not None else base
     return rows
 
 

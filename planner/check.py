@@ -12,7 +12,7 @@ from .errors import Infeasible, InvalidRequest, Unsupported
 from .limits import QUANTITIES, Boundary, magnitude, segment_bounds
 from .method import Capabilities, Method
 from .options import Options
-from .types import Demands, Note, PlanRequest
+from .types import MIN_STEP, Demands, Note, PlanRequest
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     InvalidRequest
         Something the method requires is missing, or what is given contradicts itself.
     Infeasible
-        A waypoint, an end state or a mean speed breaks a limit, so that nothing can help.
+        A waypoint or an end state breaks a limit, so that nothing can help.
     """
     can, original = method.capabilities(options), request
     _refuse_unsupported(request, method, can, methods)
@@ -65,14 +65,14 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         kept = np.arange(request.count)
     start, end = (_resolved(request, can, side) for side in ("start", "end"))
     still = not np.ptp(request.waypoints, axis=0).any() and not _moving(start) and not _moving(end)
+    still = still and not options.moves_by_itself
     if request.times is None and can.timing == "given":
         assert request.duration is not None  # _require saw to it
         if not still:
-            knots = centripetal(request.waypoints)
-            request = replace(request, times=(knots - knots[0]) / (knots[-1] - knots[0]) * request.duration.min)
+            request = replace(request, times=_spread(request))
             notes.append(Note("times_chosen", "no times were given: spread centripetally over the duration"))
     request = replace(request, start=start, end=end)
-    _refuse_hopeless(request, can.timing == "given")
+    _refuse_hopeless(request)
     demands = Demands(
         dims=request.dims,
         limits=request.limits,
@@ -143,6 +143,30 @@ def _require(request: PlanRequest, can: Capabilities) -> None:
             raise InvalidRequest.of(f"/segment_durations/{i}", "conflict", f"the times give the segment {step:g} s")
 
 
+def _spread(request: PlanRequest) -> Array:
+    """Return times over the exact duration: centripetal steps, stretched alike as far as segment durations allow."""
+    assert request.duration is not None
+    total, steps = request.duration.min, np.diff(centripetal(request.waypoints))
+    bounds = request.segment_durations or [None] * len(steps)
+    least = np.array([0.0 if b is None else b.min for b in bounds])
+    most = np.array([np.inf if b is None else b.max for b in bounds])
+    if not least.sum() <= total * (1 + 1e-9) or not most.sum() >= total * (1 - 1e-9):
+        raise InvalidRequest.of("/segment_durations", "conflict", f"they cannot add up to the duration of {total:g} s")
+    low, high = 0.0, max(total / steps.min(), 1.0)
+    for _ in range(200):
+        scale = 0.5 * (low + high)
+        if np.clip(steps * scale, least, most).sum() < total:
+            low = scale
+        else:
+            high = scale
+    spread = np.clip(steps * high, least, most)
+    times = np.concatenate([[0.0], np.cumsum(spread)])
+    times[-1] = total
+    if not (np.diff(times) >= MIN_STEP).all():
+        raise InvalidRequest.of("/duration", "bad_duration", f"leaves less than {MIN_STEP:g} s to a segment")
+    return times
+
+
 def _within(value: float, low: float, high: float) -> bool:
     return low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
 
@@ -199,14 +223,10 @@ def _moving(state: Boundary) -> bool:
     return any(np.nan_to_num(getattr(state, name)).any() for name in state.given())
 
 
-def _refuse_hopeless(request: PlanRequest, timed: bool) -> None:
-    """Refuse what no motion can cure: a waypoint, an end state or (``timed``) a mean speed beyond its limit."""
+def _refuse_hopeless(request: PlanRequest) -> None:
+    """Refuse what no motion can cure: a waypoint or an end state beyond its limit."""
     last = request.count - 2
-    _refuse_beyond(request, 0, request.waypoints[:-1], 0, "a waypoint")
-    _refuse_beyond(request, 0, request.waypoints[1:], 0, "a waypoint")
-    if timed and request.times is not None:
-        mean = np.diff(request.waypoints, axis=0) / np.diff(request.times)[:, None]
-        _refuse_beyond(request, 1, mean, 0, "the mean velocity between two waypoints")
+    _refuse_beyond(request, 0, np.stack([request.waypoints[:-1], request.waypoints[1:]]), 0, "a waypoint")
     for side, segment in ((request.start, 0), (request.end, last)):
         for order in (1, 2, 3):
             state = getattr(side, QUANTITIES[order], None)
@@ -215,14 +235,15 @@ def _refuse_hopeless(request: PlanRequest, timed: bool) -> None:
 
 
 def _refuse_beyond(request: PlanRequest, order: int, values: Array, first: int, what: str) -> None:
-    """Refuse values, one row a segment from segment ``first`` on, that lie beyond their limits."""
+    """Refuse values (…, S, D), for the segments from ``first`` on, of which one lies beyond its limits: the worst."""
     limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
-    lower, upper = limit.lower[first : first + len(values)], limit.upper[first : first + len(values)]
-    slack = 1e-9 * magnitude(lower, upper)
-    outside = (values > upper + slack) | (values < lower - slack)  # never for NaN, a free joint
-    if outside.any():
-        row, joint = (int(i) for i in np.argwhere(outside)[0])
-        value, segment = float(values[row, joint]), first + row
+    rows = slice(first, first + values.shape[-2])
+    lower, upper = limit.lower[rows], limit.upper[rows]
+    over = np.nan_to_num(np.maximum(values - upper, lower - values) / magnitude(lower, upper), nan=-np.inf)
+    if over.max() > 1e-9:  # NaN is a free joint
+        worst = np.unravel_index(int(np.argmax(over)), over.shape)
+        row, joint = int(worst[-2]), int(worst[-1])
+        value, segment = float(values[worst]), first + row
         raise Infeasible(
             f"{what} breaks the {QUANTITIES[order]} limit of joint {joint} on segment {segment}",
             joint=joint,

@@ -65,12 +65,6 @@ class Limit:
             array.setflags(write=False)
         return cls(lower, upper) if np.isfinite(lower).any() or np.isfinite(upper).any() else None
 
-    def tighter(self, other: "Limit | None") -> "Limit":
-        """Return the tighter of two limits, joint by joint."""
-        if other is None:
-            return self
-        return Limit(np.maximum(self.lower, other.lower), np.minimum(self.upper, other.upper))
-
     def scale(self) -> Array:
         """Return what errors of this limit are relative to."""
         return magnitude(self.lower, self.upper)
@@ -112,19 +106,6 @@ class Limits:
     def given(self) -> tuple[str, ...]:
         """Return the names of the limits that are there."""
         return tuple(f.name for f in fields(self) if getattr(self, f.name) is not None)
-
-    def tighter(self, other: "Limits | None") -> "Limits":
-        """Return the tighter of both, quantity by quantity."""
-        if other is None:
-            return self
-        merged: dict[str, Any] = {}
-        for f in fields(self):
-            mine, theirs = getattr(self, f.name), getattr(other, f.name)
-            if isinstance(mine, Limit):
-                merged[f.name] = mine.tighter(theirs)
-            else:
-                merged[f.name] = theirs if mine is None else mine if theirs is None else min(mine, theirs)
-        return Limits(**merged)
 
     def bounds(self, order: int, dims: int) -> Limit:
         """Return the limit of the derivative of the given order, infinite where there is none."""

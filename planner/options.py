@@ -60,6 +60,11 @@ class Options(BaseModel):
         """Whether the options give a parameter value to every waypoint, so that none may be merged."""
         return False
 
+    @property
+    def moves_by_itself(self) -> bool:
+        """Whether the options hold a curve, which may move where all waypoints are equal."""
+        return False
+
 
 def pointer(parts: tuple[Any, ...]) -> str:
     """Return the JSON pointer (RFC 6901) of a location; parts that are union tags (``#…``) are not part of it."""

@@ -85,7 +85,12 @@ class PathOptions(Options):
     @property
     def fixes_knots(self) -> bool:
         """Whether every waypoint has a parameter value of its own."""
-        return self.path.knots is not None or isinstance(self.path, PolynomialPath)
+        return self.path.knots is not None or self.moves_by_itself
+
+    @property
+    def moves_by_itself(self) -> bool:
+        """Whether the path is a curve of its own."""
+        return isinstance(self.path, PolynomialPath)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +147,7 @@ def _polynomial(option: PolynomialPath, points: Array, knots: Array | None) -> P
     if powers.ndim != 3 or powers.shape[1:] != (len(breaks) - 1, points.shape[1]) or len(powers) > 64:
         raise InvalidRequest.of(f"{where}/coefficients", "shape_mismatch", "must be [power <= 63][piece][joint]")
     curve = Trajectory.from_powers(breaks, powers)
-    if not np.abs(curve.coefficients).sum(axis=0).max() <= 1e3 * MAX_VALUE:
+    if not curve.extrema(1).peak(0).max() <= MAX_VALUE:
         raise InvalidRequest.of(f"{where}/coefficients", "out_of_range", "values on a piece must be at most 1e9")
     if knots is None:
         knots = breaks

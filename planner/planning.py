@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from .bounds import objective
 from .check import Asked, check
-from .errors import Infeasible, InvalidRequest, NotVerified, TimeLimit, UnknownMethod, Unsupported
+from .errors import InvalidRequest, NotVerified, TimeLimit, UnknownMethod, Unsupported
 from .method import Method
 from .methods import METHODS
 from .options import Options, read_options
+from .timing.stops import segment_durations
 from .trajectory import Trajectory
 from .types import Certificate, Note, PlanRequest, Solution, Stats
 from .verify import verify
@@ -65,11 +66,11 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
     with np.errstate(all="ignore"):  # what overflows does not verify
         solution = hold(asked) if asked.still else _solve(row, asked.request, chosen)
     solved = time.perf_counter()
-    if request.timeout is not None and solved - started > request.timeout:
-        raise TimeLimit(request.timeout)
     times = None if solution.waypoint_times is None else solution.waypoint_times[asked.kept]
     with np.errstate(all="ignore"):
         certificate = verify(solution.trajectory, asked.demands, times, solution.path)
+    if request.timeout is not None and time.perf_counter() - started > request.timeout:
+        raise TimeLimit(request.timeout)
     name = row.objective
     judged = replace(certificate, objective=objective(name, certificate, solution.trajectory.duration, solution.bound))
     if not certificate.holds:
@@ -142,22 +143,10 @@ def beyond_precision(trajectory: Trajectory, waypoints: Array) -> str | None:
 def hold(asked: Asked) -> Solution:
     """Return the answer where nothing moves: the position is held, for as long as times or durations ask."""
     request = asked.request
-    steps = np.zeros(request.count - 1) if request.times is None else np.diff(request.times)
-    least = [0.0 if b is None else b.min for b in request.segment_durations or [None] * len(steps)]
-    steps = np.maximum(steps, least)
-    if request.duration is not None:
-        if steps.sum() > request.duration.max * (1.0 + 1e-9):
-            raise Infeasible(
-                "the times or minimum durations add up to more than the duration allows",
-                quantity="duration",
-                bound=request.duration.max,
-                needed=float(steps.sum()),
-                minimum_duration=float(steps.sum()),
-                certified=True,
-            )
-        steps[-1] += max(request.duration.min - steps.sum(), 0.0)
+    given = np.zeros(request.count - 1) if request.times is None else np.diff(request.times)
+    steps = segment_durations(given, request)
     times = np.concatenate([[0.0], np.cumsum(steps)])
     if request.times is not None:
-        times = np.where(steps.sum() > np.ptp(request.times), request.times[0] + times, request.times)
+        times = request.times if (steps == given).all() else request.times[0] + times
     trajectory = Trajectory.hold(request.waypoints[0], float(times[0]), float(times[-1]))
     return Solution(trajectory, times, Stats("hold", "nothing moves", 0))

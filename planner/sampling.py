@@ -26,10 +26,10 @@ class Samples:
 
 def sample_count(sampling: Sampling, duration: float) -> int:
     """Return how many samples a trajectory of that duration gets."""
-    if sampling.times is not None:
-        return len(sampling.times)
     if duration == 0.0:
         return 2
+    if sampling.times is not None:
+        return len(sampling.times)
     if sampling.dt is not None:
         return 1 + max(1, math.ceil(min(duration / sampling.dt, 1e18) - 1e-9))
     assert sampling.count is not None
@@ -57,18 +57,22 @@ def sample(trajectory: Trajectory, sampling: Sampling, most: int | None = None) 
     count = sample_count(sampling, trajectory.duration)
     refuse_too_many(count, trajectory.dims, most)
     start, end = trajectory.start, trajectory.end
-    if sampling.times is not None:
+    if trajectory.duration == 0.0:
+        times = np.array([start, start])
+    elif sampling.times is not None:
         times = sampling.times
         outside = (times < start) | (times > end)
         if outside.any():
             i = int(np.argmax(outside))
             raise InvalidRequest.of(f"/sampling/times/{i}", "out_of_range", f"must lie in [{start!r}, {end!r}]")
-    elif sampling.dt is not None and trajectory.duration > 0:
+    elif sampling.dt is not None:
         times = start + sampling.dt * np.arange(count, dtype=np.float64)
         times[-1] = end
     else:
         times = np.linspace(start, end, count, dtype=np.float64)
     times = np.clip(times, start, end)
+    if trajectory.duration > 0 and not (np.diff(times) > 0).all():
+        raise InvalidRequest.of("/sampling", "out_of_range", "samples fall on the same instant of the clock")
     return Samples(times, *trajectory.states(times, 4))
 
 

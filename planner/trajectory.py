@@ -12,6 +12,8 @@ from .errors import InvalidRequest
 
 Array = NDArray[np.float64]
 
+#: Shortest piece whose derivatives stay in the range of floating point.
+SHORTEST = 1e-75
 #: A jump counts above this part of the derivative's peak.
 JUMP = 1e-6
 
@@ -64,8 +66,10 @@ class Trajectory:
         if not (np.isfinite(breaks).all() and np.isfinite(coefficients).all()):
             raise InvalidRequest.of("", "not_finite", "a trajectory's breaks and coefficients must be finite")
         still = len(breaks) == 2 and breaks[0] == breaks[1] and len(coefficients) == 1
-        if not still and not (np.diff(breaks) > 0).all():
-            raise InvalidRequest.of("", "not_increasing", "a trajectory's breaks must increase")
+        if not still and not (np.diff(breaks) > SHORTEST).all():
+            raise InvalidRequest.of(
+                "", "not_increasing", f"a trajectory's breaks must increase, by {SHORTEST:g} or more"
+            )
         for array in (breaks, coefficients):
             array.setflags(write=False)
         object.__setattr__(self, "breaks", breaks)
@@ -225,10 +229,16 @@ class Trajectory:
         jumps = np.abs(self.jumps(order))
         if order == 0:
             return np.asarray(jumps > JUMP * span)
-        size = 1e3 * np.abs(self.coefficients).max(axis=0)
-        h = np.diff(self.breaks)[:, None]
-        rounding = np.finfo(float).eps * (size / h**order + order * np.abs(self.breaks).max() / h * peak)
-        return np.asarray(jumps > JUMP * peak + np.maximum(rounding[1:], rounding[:-1]))
+        eps, h = np.finfo(float).eps, np.diff(self.breaks)[:, None]
+        size = np.abs(self.coefficients[:-1]).max(axis=0, initial=0.0)
+        rounding = 64 * eps * size / h**order
+        own = np.abs(_differentiated(self.coefficients, order)).sum(axis=0) / h**order
+        floor = 1e3 * eps * np.abs(self.coefficients[-1]) / h**order
+        noise = (own <= floor).all(axis=0)  # a joint that stands still but for rounding of where it stands
+        rounding = np.where(noise, np.maximum(rounding, floor), rounding)
+        clock = np.minimum(eps * np.abs(self.breaks[1:-1, None]) / np.minimum(h[1:], h[:-1]), 1e-4)
+        allowed = np.maximum(rounding[1:], rounding[:-1]) + order * clock * np.maximum(own[1:], own[:-1])
+        return np.asarray(jumps > JUMP * peak + allowed)
 
     def extrema(self, orders: int = 4) -> Extrema:
         """Return the exact extrema of the derivatives of order 0 … orders-1, piece by piece."""

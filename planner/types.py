@@ -69,7 +69,6 @@ class PlanRequest:
     tube: Array | None = None
     robot: Mapping[str, Any] | None = None
     joint_names: tuple[str, ...] | None = None
-    bound: bool = False
     timeout: float | None = None
 
     @property
@@ -91,7 +90,7 @@ class PlanRequest:
         waypoints : (N, D) or (N,) for one joint, N >= 2
         **given
             ``times`` (N,) s, ``limits``, ``segment_limits``, ``segment_durations``, ``duration``, ``start``, ``end``,
-            ``waypoint_states``, ``waypoint_tolerance``, ``tube``, ``robot``, ``joint_names``, ``bound``, ``timeout`` s.
+            ``waypoint_states``, ``waypoint_tolerance``, ``tube``, ``robot``, ``joint_names``, ``timeout`` s.
 
         Raises
         ------
@@ -121,7 +120,6 @@ class PlanRequest:
             "tube": lambda v: _half_width(v, dims, "/tube"),
             "robot": lambda v: v,
             "joint_names": lambda v: _names(v, dims),
-            "bound": bool,
             "timeout": lambda v: positive(v, "/timeout"),
         }
         findings = reading.Findings()

@@ -88,25 +88,25 @@ class _Motion:
     at_low: Array
     at_high: Array
     peaks: Array  # (4, D)
-    unbounded: NDArray[np.bool_]  # (4, D): a lower derivative jumps
-    jump_time: Array  # (4, D)
+    jumps: NDArray[np.bool_]  # (4, K - 1, D): at which breaks a lower derivative jumps, so that this one is unbounded
+
+    @property
+    def unbounded(self) -> NDArray[np.bool_]:
+        """Which derivatives are unbounded somewhere, (4, D)."""
+        return np.asarray(self.jumps.any(axis=1))
 
 
 def _measure(trajectory: Trajectory, demands: Demands, at: Array | None) -> _Motion:
     found = trajectory.extrema(4)
     peaks = np.stack([found.peak(m) for m in range(4)])
     span = position_span(trajectory if demands.waypoints is None else demands.waypoints)
-    unbounded = np.zeros((4, trajectory.dims), dtype=bool)
-    jump_time = np.full((4, trajectory.dims), np.nan)
+    jumps = np.zeros((4, trajectory.pieces - 1, trajectory.dims), dtype=bool)
     for m in range(3):
-        jumps = trajectory.counted_jumps(m, peaks[m], span)
-        unbounded[m + 1] = unbounded[m] | jumps.any(axis=0)
-        first = trajectory.breaks[1 + jumps.argmax(axis=0)] if len(jumps) else jump_time[m]
-        jump_time[m + 1] = np.where(unbounded[m], jump_time[m], first)
+        jumps[m + 1] = jumps[m] | trajectory.counted_jumps(m, peaks[m], span)
     middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
     segment = np.zeros(len(middles), dtype=np.int64)
     if at is not None:
-        segment = np.clip(np.searchsorted(at, middles, side="right") - 1, 0, len(at) - 2)
+        segment = np.clip(np.searchsorted(at, middles, side="right") - 1, 0, max(len(at) - 2, 0))
     return _Motion(
         trajectory,
         demands,
@@ -117,8 +117,7 @@ def _measure(trajectory: Trajectory, demands: Demands, at: Array | None) -> _Mot
         found.at_low,
         found.at_high,
         peaks,
-        unbounded,
-        jump_time,
+        jumps,
     )
 
 
@@ -150,14 +149,14 @@ def _limit_row(motion: _Motion, order: int) -> Check | None:
     if not bounded.any():
         return None
     quantity = QUANTITIES[order]
-    infinite = motion.unbounded[order] & bounded.any(axis=0)
+    infinite = motion.jumps[order] & bounded[:-1] & bounded[1:]  # between segments: where both are limited
     if infinite.any():
-        joint = int(np.argmax(infinite))
-        time = float(motion.jump_time[order, joint])
-        piece = int(np.clip(np.searchsorted(motion.trajectory.breaks, time) - 1, 0, len(motion.segment) - 1))
+        piece, joint = (int(i) for i in np.argwhere(infinite)[0])
         side = upper[piece, joint] if np.isfinite(upper[piece, joint]) else lower[piece, joint]
-        segment = int(motion.segment[piece])
+        time, segment = float(motion.trajectory.breaks[piece + 1]), int(motion.segment[piece])
         return Check(quantity, joint, segment, time, None, _finite(side), None, False)
+    if not (np.isfinite(motion.high[order]).all() and np.isfinite(motion.low[order]).all()):
+        return Check(quantity, None, None, None, None, None, None, False)
     scale = magnitude(lower, upper)
     high, low = motion.high[order], motion.low[order]
     excess = np.stack([(high - upper) / scale, (lower - low) / scale])
@@ -264,6 +263,9 @@ def _path_deviation(trajectory: Trajectory, path: Followed) -> float:
 _RULES = [(0.5 + 0.5 * x, 0.5 * w) for x, w in map(np.polynomial.legendre.leggauss, (8, 16))]
 
 
+MOST_PIECES = 1 << 16
+
+
 def path_length(trajectory: Trajectory) -> float:
     """Return the integral of the Euclidean norm of the velocity, to about 1e-10 relative.
 
@@ -274,14 +276,17 @@ def path_length(trajectory: Trajectory) -> float:
         return 0.0
     slopes = trajectory.coefficients[:-1] * np.arange(n, 0, -1.0)[:, None, None]  # d/du, highest power first
     piece, left, width = np.arange(trajectory.pieces), np.zeros(trajectory.pieces), np.ones(trajectory.pieces)
+    noise = 64 * np.finfo(float).eps * np.sqrt((np.abs(slopes).sum(axis=0) ** 2).sum(axis=1))
     total = 0.0
     for _ in range(48):
         a, b = (_speed_integrals(slopes[:, piece], left, width, *rule) for rule in _RULES)
         scale = max(total + float(b.sum()), 1e-300)
-        rough = np.abs(a - b) > 1e-11 * scale / np.sqrt(len(a))
+        rough = np.abs(a - b) > np.maximum(1e-11 * scale / np.sqrt(len(a)), noise[piece] * width)
         total += float(b[~rough].sum())
         if not rough.any():
             return total
+        if rough.sum() > MOST_PIECES:  # rounding, or kinks without end: what there is, is good enough
+            break
         piece, half = np.repeat(piece[rough], 2), 0.5 * width[rough]
         left = np.stack([left[rough], left[rough] + half], axis=1).reshape(-1)
         width = np.repeat(half, 2)

@@ -4,7 +4,7 @@ import platform
 from functools import cache
 from importlib import metadata
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Depends
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -14,9 +14,9 @@ from .. import encode
 from ..errors import KINDS, Refusal
 from ..negotiate import choose
 from ..openapi import operation
-from ..web import caps_of, respond
+from ..web import caps_of, no_query, respond
 
-router = APIRouter()
+router = APIRouter(dependencies=[Depends(no_query)])
 
 #: Whose versions may change an answer.
 LIBRARIES = (

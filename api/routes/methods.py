@@ -1,15 +1,15 @@
 """``GET /v1/methods``: what each method does, needs and honours."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Depends
 from starlette.requests import Request
 from starlette.responses import Response
 
 from planner import describe_method, list_methods
 
 from ..openapi import operation
-from ..web import respond
+from ..web import no_query, respond
 
-router = APIRouter()
+router = APIRouter(dependencies=[Depends(no_query)])
 
 
 @router.get("/v1/methods", **operation("methods"))

@@ -9,7 +9,8 @@ Array = NDArray[np.float64]
 def centripetal(points: Array) -> Array:
     """Return knots on [0, 1] whose steps are the square roots of the chord lengths.
 
-    u_{i+1} - u_i = sqrt(|q_{i+1} - q_i|) / sum. Equal neighbours would share a knot, so each is given a small step.
+    u_{i+1} - u_i = sqrt(|q_{i+1} - q_i|) / sum. Equal neighbours would share a knot: a dwell gets the mean of the
+    other steps, a very short move at least 1e-6 of the longest.
 
     Parameters
     ----------
@@ -25,6 +26,10 @@ def centripetal(points: Array) -> Array:
     """
     steps = np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=1))
     largest = steps.max()
-    steps = np.maximum(steps / largest, 1e-6) if largest > 0 else np.ones(len(steps))
+    if largest > 0:
+        moving = steps > 0
+        steps = np.where(moving, np.maximum(steps / largest, 1e-6), steps[moving].mean() / largest)
+    else:
+        steps = np.ones(len(steps))
     knots = np.concatenate([[0.0], np.cumsum(steps)])
     return np.asarray(knots / knots[-1])

@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from problems.rest_to_rest import double_integrator, triple_integrator
 
+from ..deadline import Deadline
 from ..errors import Infeasible, SolverFailed, Unsupported
 from ..limits import Boundary, Limit, segment_bounds
 from ..method import Capabilities, Method, Reference
 from ..options import Options
 from ..timing.state_to_state import Segment, refuse_overshoot, time_optimal
-from ..timing.stops import segment_durations, stops_bound
+from ..timing.stops import refuse_longer, segment_durations, stops_bound
 from ..trajectory import Trajectory
 from ..types import Bound, Note, PlanRequest, Solution, Stats
 
@@ -25,8 +26,10 @@ class RuckigOptions(Options):
 
 def solve(request: PlanRequest, options: RuckigOptions) -> Solution:
     """Return time-optimal segments from waypoint to waypoint, at rest in between."""
-    segments = _segments(request)
-    parts = [_shortest(s, i) for i, s in enumerate(segments)]
+    segments, deadline, parts = _segments(request), Deadline(request.timeout), []
+    for i, segment in enumerate(segments):
+        deadline.left()
+        parts.append(_shortest(segment, i))
     durations = segment_durations(np.array([p.duration for p in parts]), request)
     for i, (segment, part, duration) in enumerate(zip(segments, parts, durations, strict=True)):
         if duration <= part.duration * (1.0 + 1e-12):
@@ -37,14 +40,14 @@ def solve(request: PlanRequest, options: RuckigOptions) -> Solution:
             parts[i] = part.scaled(duration / part.duration)
         else:
             parts[i] = _shortest(replace(segment, least=duration), i)
+    refuse_longer(np.array([p.duration for p in parts]), durations, request)
     times = np.concatenate([[0.0], np.cumsum([p.duration for p in parts])])
     kept = [p.shifted(t) for p, t in zip(parts, times, strict=False) if p.duration > 0]
     trajectory = Trajectory.concatenate(kept)
     for i, (segment, part) in enumerate(zip(segments, parts, strict=True)):
         refuse_overshoot(segment, part, i)
     notes: tuple[Note, ...] = ()
-    jerk = request.limits.jerk
-    if jerk is not None and (jerk.lower != -jerk.upper).any():
+    if _two_sided_jerk(request):
         notes = (Note("jerk_symmetric", "ruckig takes one jerk limit per joint: the smaller side was used for both"),)
     return Solution(trajectory, times, Stats("ruckig"), bound=_bound(segments, request), notes=notes)
 
@@ -76,6 +79,11 @@ def _segments(request: PlanRequest) -> list[Segment]:
     ]
 
 
+def _two_sided_jerk(request: PlanRequest) -> bool:
+    jerk = segment_bounds(request.limits, request.segment_limits, 3, request.count - 1, request.dims)
+    return bool((jerk.lower != -jerk.upper).any())
+
+
 def _still(segment: Segment) -> bool:
     return segment.rests and not (segment.p1 - segment.p0).any()
 
@@ -101,8 +109,7 @@ def _bound(segments: list[Segment], request: PlanRequest) -> Bound | None:
         (s.velocity.lower == -s.velocity.upper).all() and (s.acceleration.lower == -s.acceleration.upper).all()
         for s in segments
     )
-    jerk = request.limits.jerk
-    if not symmetric or not all(s.rests for s in segments) or (jerk is not None and (jerk.lower != -jerk.upper).any()):
+    if not symmetric or not all(s.rests for s in segments) or _two_sided_jerk(request):
         return None
     move = np.stack([np.abs(s.p1 - s.p0) for s in segments])
     v, a = np.stack([s.velocity.upper for s in segments]), np.stack([s.acceleration.upper for s in segments])

@@ -5,8 +5,9 @@ from pydantic import Field
 
 from ..errors import InvalidRequest
 from ..method import Capabilities, Method, Reference
-from ..paths import CubicSplinePath, LinearPath, PathOptions, build_path, refuse_position_limits
+from ..paths import CubicSplinePath, LinearPath, Path, PathOptions, build_path, refuse_position_limits
 from ..timing.scaling import slowdown, stretched
+from ..timing.stops import segment_bounds_of
 from ..trajectory import Trajectory
 from ..types import Followed, Note, PlanRequest, Solution, Stats
 
@@ -21,7 +22,7 @@ def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
     """Return the path run through at a uniformly scaled clock: as slow as the limits ask, no slower."""
     if request.times is not None and options.path.knots is not None:
         raise InvalidRequest.of("/options/path/knots", "conflict", "the times are the path's knots: send one of both")
-    path = build_path(options.path, request.waypoints, "clamped", request.times)
+    path = _path(request, options)
     refuse_position_limits(path, request)
     needed = slowdown(path.curve, request, path.knots)
     span = path.curve.duration
@@ -36,7 +37,7 @@ def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
         raise InvalidRequest.of("/limits", "missing", "needed: a velocity, acceleration or jerk limit, or times")
     factor = duration / span
     for i, bounds in enumerate(request.segment_durations or ()):
-        stretched(factor * steps[i], bounds, "segment_duration")
+        stretched(factor * steps[i], bounds, i)
     start = path.curve.start if request.times is None else float(request.times[0])
     begin = 0.0 if request.times is None else start
     trajectory = path.curve.scaled(factor).shifted(begin - start)
@@ -47,6 +48,23 @@ def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
     if needed.binding is not None and factor == least == needed.factor:
         notes = (Note("binding_limit", f"the {needed.binding} limit sets the time scale, {factor:.9g}"),)
     return Solution(trajectory, knots, Stats("closed_form"), Followed(path.curve, law), notes=notes)
+
+
+def _path(request: PlanRequest, options: TimeScaledOptions) -> Path:
+    """Return the path; where its knots are ours to choose, a dwell gets what makes it last its least duration."""
+    path = build_path(options.path, request.waypoints, "clamped", request.times)
+    still = ~np.diff(request.waypoints, axis=0).any(axis=1)
+    if request.times is not None or options.fixes_knots or request.segment_durations is None or not still.any():
+        return path
+    least, _ = segment_bounds_of(request)
+    steps = np.diff(path.knots)
+    for _ in range(6):  # the scale hardly depends on the dwells' knots
+        moving = float(max(slowdown(path.curve, request, path.knots).factor, (least / steps)[~still].max()))
+        if moving <= 0:
+            break
+        steps[still] = np.clip(least[still] / moving, 1e-6 * steps.max(), None)
+        path = build_path(options.path, request.waypoints, "clamped", np.concatenate([[0.0], np.cumsum(steps)]))
+    return path
 
 
 def _exactly(breaks: np.ndarray, curve_breaks: np.ndarray, knots: np.ndarray, times: np.ndarray) -> np.ndarray:

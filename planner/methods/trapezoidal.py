@@ -16,6 +16,9 @@ from ..types import Followed, PlanRequest, Solution, Stats
 Array = NDArray[np.float64]
 
 
+#: Steepest acceleration used, over the square of the velocity of a unit move.
+GENTLE = 1e7
+
 Phase = tuple[float, tuple[float, float, float]]
 
 
@@ -25,10 +28,15 @@ class TrapezoidalOptions(Options):
 
 def solve(request: PlanRequest, options: TrapezoidalOptions) -> Solution:
     """Return bang-bang acceleration along the straight line of each segment, all joints in step, at rest between."""
-    velocity, rising, falling = _along(request)
+    velocity, *steepest = _along(request)
+    rising, falling = steepest
+    gentle = GENTLE * velocity**2  # of a unit move: ramps of at least 1e-7 of the cruise, or the clock cannot hold them
+    rising, falling = np.minimum(rising, gentle), np.minimum(falling, gentle)
     ones = np.ones_like(velocity)
-    moving = np.isfinite(rising)
-    shortest = np.where(moving, double_integrator(ones, velocity, np.where(moving, rising, 1), falling), 0.0)
+    moving = np.abs(np.diff(request.waypoints, axis=0)).max(axis=1) > 0
+    shortest = np.where(
+        moving, double_integrator(ones, velocity, *(np.where(moving, a, 1) for a in (rising, falling))), 0.0
+    )
     durations = segment_durations(shortest, request)
     times = np.concatenate([[0.0], np.cumsum(durations)])
     breaks, powers = [0.0], []
@@ -43,7 +51,8 @@ def solve(request: PlanRequest, options: TrapezoidalOptions) -> Solution:
         breaks[-1] = times[i + 1]
     law = Trajectory.from_powers(breaks, np.array(powers).T[:, :, None])
     curve = linear(np.arange(request.count), request.waypoints)
-    bound = stops_bound(shortest[:, None], request)
+    true = double_integrator(ones, velocity, *(np.where(moving, a, 1) for a in steepest))
+    bound = stops_bound(np.where(moving, true, 0.0)[:, None], request)
     return Solution(curve.compose(law), times, Stats("closed_form"), Followed(curve, law), bound)
 
 

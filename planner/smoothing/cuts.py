@@ -1,7 +1,7 @@
 """Cutting planes for one joint: which limits a motion breaks, and the rows that forbid it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,13 +50,14 @@ class JointBounds:
 class Cuts:
     """A statement of one joint (the caller's ``joint``) and its bounds.
 
-    ``relaxed`` (elastic solves) widens each bound by that part of its size; ``tighter`` is the part it is tightened by.
+    ``relaxed`` (elastic solves) widens the bounds of each order by that part of their size; ``tighter`` is the part
+    they are tightened by.
     """
 
     problem: MinimumJerk
     joint: int
     bounds: JointBounds
-    relaxed: float = 0.0
+    relaxed: Array = field(default_factory=lambda: np.zeros(4))
     tighter: float = TIGHTER
 
     def exact(self) -> "Cuts":
@@ -93,7 +94,7 @@ class Cuts:
         motion = self.motion(y)
         found = motion.extrema(4)
         h, t = np.diff(motion.breaks), motion.breaks[:-1]
-        room = self.relaxed * self.scale()
+        room = self.relaxed[:, None] * self.scale()
         high = found.high[:, :, 0] - self.bounds.upper - room
         low = self.bounds.lower - room - found.low[:, :, 0]
         where = np.stack([(found.at_high[:, :, 0] - t) / h, (found.at_low[:, :, 0] - t) / h])
@@ -106,6 +107,13 @@ class Cuts:
         allowed = np.where(margin > ROUNDING * self.scale(), -0.5 * margin, ROUNDING * self.scale())
         found = np.argwhere(excess > allowed)
         return [(int(i), float(where[s, m, i]), int(m), 1 - 2 * int(s)) for s, m, i in found]
+
+    def rows_at(self, places: Array) -> list[Row]:
+        """Return the rows of every finite bound at fixed places in [0, 1] on every gap."""
+        sides = np.stack([self.bounds.upper, self.bounds.lower])
+        return [
+            (int(i), float(u), int(m), 1 - 2 * int(s)) for s, m, i in np.argwhere(np.isfinite(sides)) for u in places
+        ]
 
     def table(self, rows: Sequence[Row], tightened: bool) -> tuple[csr_matrix, Array, Array]:
         """Return the rows as G and h, each divided by its bound's size, and those sizes."""

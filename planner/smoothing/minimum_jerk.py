@@ -176,7 +176,7 @@ def _rounds(cuts: Cuts, backend: Backend, deadline: Deadline) -> tuple[_Joint, s
     z, seconds, iterations = np.zeros(0), 0.0, 0
     for _ in range(ROUNDS):
         found = cuts.new_rows(y)
-        if not found and (rows or backend.name == "piqp"):
+        if rows and not found:
             return _Joint(y, z, cuts.program(rows, tightened=False)), backend.name, iterations, seconds
         if not len(y):
             raise SolverFailed(backend.name, "nothing is free")

@@ -1,6 +1,8 @@
 """Nonlinear programs through CasADi; a solution counts when the constraint residual that we compute passes."""
 
+import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +13,9 @@ from ..errors import SolverFailed, TimeLimit
 from . import Backend
 
 Array = NDArray[np.float64]
+
+#: CasADi is not safe for threads, neither in building expressions nor in solving: one at a time.
+_ONE_AT_A_TIME = threading.Lock()
 
 #: Asked of the solver, and accepted by us (constraints are scaled to one).
 ASKED = 1e-8
@@ -28,16 +33,27 @@ class NLPSolution:
     violation: float
 
 
-def solve_nlp(problem: dict[str, Any], backend: Backend, time_limit: float | None = None) -> NLPSolution:
-    """Solve the program that a statement's ``to_casadi`` returned.
+def solve_nlp(pose: Callable[[], dict[str, Any]], backend: Backend, time_limit: float | None = None) -> NLPSolution:
+    """Solve the program that ``pose`` returns: what a statement's ``to_casadi`` gives.
 
     Raises
     ------
     SolverFailed
         The iterate at which the solver stopped breaks its constraints.
     TimeLimit
-        It stopped because the time ran out.
+        It stopped, or had not begun, because the time ran out.
     """
+    started = time.perf_counter()
+    if not _ONE_AT_A_TIME.acquire(timeout=-1 if time_limit is None else time_limit):
+        raise TimeLimit(time_limit or 0.0)
+    try:
+        waited = time.perf_counter() - started
+        return _solve(pose(), backend, None if time_limit is None else max(time_limit - waited, 1e-3))
+    finally:
+        _ONE_AT_A_TIME.release()
+
+
+def _solve(problem: dict[str, Any], backend: Backend, time_limit: float | None) -> NLPSolution:
     import casadi as ca
 
     settings = {f"{backend.name}.{k}": v for k, v in backend.settings(ASKED, time_limit).items()}

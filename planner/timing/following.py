@@ -10,7 +10,7 @@ from ..errors import SolverFailed
 from ..limits import Limits
 from ..paths import Path, refuse_position_limits
 from ..trajectory import Trajectory
-from ..types import Followed, Note, PlanRequest, Solution, Stats
+from ..types import MIN_STEP, Followed, Note, PlanRequest, Solution, Stats
 from .scaling import local_factors, slowdown, stretched
 
 Array = NDArray[np.float64]
@@ -41,6 +41,8 @@ class Units:
         for order in (2, 3):  # a straight line has no curvature to tell how long a start from rest takes
             limit = limits.bounds(order, stretch.dims)
             second = max(second, float((gap / np.minimum(limit.upper, -limit.lower)).max()) ** (1.0 / order))
+        if not np.isfinite(np.float64(second) ** 3):
+            raise OverflowError("the limits are too small for this move")
         return cls(np.where(moving, length, 1.0), parameter, second if second > 0 else 1.0, moving)
 
 
@@ -52,6 +54,9 @@ class Timed:
     seconds: float
     notes: tuple[Note, ...] = ()
 
+
+#: What a dwell takes of the whole motion: the path asks for one, nothing says how long.
+DWELL = 1e-6
 
 #: Times one smooth stretch of path.
 TimeStretch = Callable[[Trajectory, Units], Timed]
@@ -72,13 +77,15 @@ def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: 
     """
     refuse_position_limits(path, request)
     corners = _corners(path.curve, 2 if request.limits.jerk is not None else 1)
-    laws: list[Trajectory] = []
-    seconds, notes = 0.0, dict[Note, None]()
-    for stretch in split(path.curve, corners):
-        timed = time_stretch(stretch, Units.of(stretch, request.limits))
-        laws.append(timed.law)
-        seconds += timed.seconds
-        notes.update(dict.fromkeys(timed.notes))
+    stretches = split(path.curve, corners)
+    timed = [time_stretch(s, Units.of(s, request.limits)) if s.coefficients[:-1].any() else None for s in stretches]
+    dwell = max(DWELL * sum(t.law.duration for t in timed if t), MIN_STEP)
+    laws = [
+        Trajectory.from_hermite([0.0, dwell], [[s.start], [s.end]]) if t is None else t.law
+        for s, t in zip(stretches, timed, strict=True)
+    ]
+    seconds = sum(t.seconds for t in timed if t)
+    notes = dict.fromkeys(note for t in timed if t for note in t.notes)
     law = in_a_row(laws)
     times = _reached(law, path.knots)
     trajectory = path.curve.compose(law)

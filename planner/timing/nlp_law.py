@@ -27,7 +27,7 @@ def nlp_law(stretch: Trajectory, limits: Limits, units: Units, grid: Array, time
     """
     problem = _statement(stretch, limits, units, grid)
     guess = _smooth_guess(stretch, limits, units, grid)
-    answer = solve_nlp(problem.to_casadi(*guess), select("nlp")[0], time_limit)
+    answer = solve_nlp(lambda: problem.to_casadi(*guess), select("nlp")[0], time_limit)
     speed, acceleration, steps = problem.read(answer.x)
     if not (np.isfinite(steps).all() and (steps > 0).all()):
         raise SolverFailed("ipopt", "the path speed vanishes between stations")

@@ -73,7 +73,7 @@ def local_factors(trajectory: Trajectory, limits: Limits) -> Array:
     return factors
 
 
-def stretched(least: float, bounds: DurationBounds | None, what: str = "duration") -> float:
+def stretched(least: float, bounds: DurationBounds | None, segment: int | None = None) -> float:
     """Return the shortest allowed duration that is at least ``least``.
 
     Raises
@@ -85,10 +85,12 @@ def stretched(least: float, bounds: DurationBounds | None, what: str = "duration
         return least
     if least > bounds.max * (1.0 + 1e-9):
         raise Infeasible(
-            f"the shortest duration this method can do is {least:.9g} s, longer than the {bounds.max:.9g} s allowed",
-            quantity=what,
+            f"{'the whole' if segment is None else f'segment {segment}'} takes at least {least:.9g} s with this method "
+            f"and what else was asked, longer than the {bounds.max:.9g} s allowed",
+            quantity="duration" if segment is None else "segment_duration",
+            segment=segment,
             bound=bounds.max,
             needed=least,
-            minimum_duration=least,
+            minimum_duration=least if segment is None else None,
         )
     return max(min(least, bounds.max), bounds.min)

@@ -61,6 +61,23 @@ def segment_durations(shortest: Array, request: PlanRequest) -> Array:
     return durations
 
 
+def refuse_longer(made: Array, asked: Array, request: PlanRequest) -> None:
+    """Refuse motions longer than asked: from or to a moving state, the durations that exist have gaps."""
+    _, most = segment_bounds_of(request)
+    longer = made > asked * (1.0 + 1e-9)
+    total = np.inf if request.duration is None else request.duration.max * (1.0 + 1e-9)
+    if not (longer & (made > most)).any() and not (longer.any() and made.sum() > total):
+        return
+    i = int(np.argmax(longer))
+    raise Infeasible(
+        f"there is no motion of {asked[i]:.9g} s on segment {i}; the next one takes {made[i]:.9g} s",
+        quantity="segment_duration",
+        segment=i,
+        bound=float(asked[i]),
+        needed=float(made[i]),
+    )
+
+
 def stops_bound(shortest: Array, request: PlanRequest) -> Bound:
     """Return the bound for stops at every waypoint, from the joints' own shortest times on each segment (N - 1, D)."""
     least, _ = segment_bounds_of(request)

@@ -1,6 +1,7 @@
 """The command line, called in this process."""
 
 import csv
+import errno
 import io
 import json
 import socket
@@ -75,7 +76,31 @@ def test_out_csv(run, file, tmp_path):
 def test_out_in_a_format_not_there(run, file, tmp_path):
     err = run("plan", file(GOOD), "--out", str(tmp_path / "x.npz"), code=2)
     assert ".json, .csv" in err
-    run("plan", file(GOOD), "--out", str(tmp_path / "nowhere" / "x.json"), code=1)
+
+
+def test_out_that_cannot_be_written_is_named(run, file, tmp_path):
+    (tmp_path / "folder.json").mkdir()
+    (tmp_path / "plain").write_text("")
+    for name in ("nowhere/x.csv", "folder.json", "plain/x.csv"):
+        err = run("plan", file(GOOD), "--out", str(tmp_path / name), code=2)
+        assert err.startswith(f"waywright: {tmp_path / name}: ")
+    assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
+
+
+def test_a_full_disk_is_not_bad_input(run, file, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / ".x.csv.tmp"))
+
+    monkeypatch.setattr("api.__main__.os.replace", full)
+    err = run("plan", file(GOOD), "--out", str(tmp_path / "x.csv"), code=1)
+    assert err == f"waywright: {tmp_path / 'x.csv'}: No space left on device\n"
+
+
+@pytest.mark.parametrize("options", [[1], [], 0, "", "x", False])
+def test_options_that_are_no_object(run, file, options):
+    for extra in ((), ("-o", "backend=piqp")):
+        assert "/options" in run("plan", file(GOOD | {"options": options}), *extra, code=2)
+    assert "certified" in run("plan", file(GOOD | {"options": None}), "-o", "backend=piqp")
 
 
 @pytest.mark.parametrize(

@@ -110,6 +110,8 @@ def test_compare(client):
     assert isinstance(rows[1]["samples"], Samples)
     assert isinstance(problem_error(rows[0]["error"]), Unsupported)
     assert "samples" not in client.compare(WAYPOINTS, ["linear"], times=TIMES)[0]
+    (row,) = client.compare(WAYPOINTS, ["linear"], times=TIMES, include=["polynomial"])
+    assert isinstance(row["polynomial"], Trajectory) and "samples" not in row
 
 
 def test_certify(client):

@@ -25,7 +25,7 @@ def test_rows_come_in_the_order_asked(service):
     assert refused["duration"] is refused["certificate"] is refused["peaks"] is refused["cost"] is None
     assert refused["error"]["type"] == "/errors/unsupported"
     assert (refused["error"]["status"], refused["error"]["instance"]) == (422, COMPARE)
-    assert "error" not in answered and "samples" in answered
+    assert "error" not in answered and "samples" not in answered and "polynomial" not in answered
     assert answered["duration"] == 2.0
     assert answered["cost"]["squared_jerk"] == pytest.approx(452.5)
     assert answered["peaks"]["jerk"][1] == pytest.approx(42.5)
@@ -45,6 +45,30 @@ def test_all_methods_in_the_catalogues_order(service):
     assert [row["method"] for row in found] == list(METHODS)
     assert all("samples" not in row for row in found)
     assert {row["method"] for row in found if row["ok"]} >= {"linear", "cubic_spline", "minimum_jerk", "time_scaled"}
+
+
+@pytest.mark.parametrize(
+    "include, held",
+    [
+        (None, set()),
+        ([], set()),
+        (["samples"], {"samples"}),
+        (["polynomial"], {"polynomial"}),
+        (["polynomial", "samples"], {"samples", "polynomial"}),
+    ],
+)
+def test_rows_hold_what_is_included(service, include, held):
+    asked = BODY | {"include": include, "sampling": {"count": 7}}
+    refused, row = rows(service, asked | {"methods": ["ruckig", "minimum_jerk"]})
+    assert held == {"samples", "polynomial"} & set(row)
+    assert not {"samples", "polynomial"} & set(refused)
+    answer = service.post("/v1/trajectories", json=asked | {"include": ["samples", "polynomial"]}).json()
+    assert all(row[name] == answer[name] for name in held)
+
+
+def test_a_bound_in_a_row(service):
+    (row,) = rows(service, BODY | {"methods": ["minimum_jerk"], "include": ["bound"]})
+    assert row["certificate"]["objective"]["lower_bound"] is not None
 
 
 def test_the_request_id_is_in_the_rows_problem(service):
@@ -93,12 +117,12 @@ def test_a_comparison_that_is_wrong(service, problem, changes, field, code):
 
 def test_rows_share_the_cap_on_samples(service, problem):
     body = BODY | {"methods": ["linear"] * 10}
-    problem(service.post(COMPARE, json=body | {"sampling": {"count": 200_000}}), "too_large")
+    problem(service.post(COMPARE, json=body | {"sampling": {"count": 200_000}, "include": ["samples"]}), "too_large")
 
 
 def test_too_many_samples_for_one_row(service):
     body = {"waypoints": [[0], [1]], "limits": {"velocity": 1, "acceleration": 1}, "sampling": {"dt": 1e-9}}
-    (row,) = rows(service, body | {"methods": ["trapezoidal"]})
+    (row,) = rows(service, body | {"methods": ["trapezoidal"], "include": ["samples"]})
     assert row["error"]["type"] == "/errors/too_large"
 
 

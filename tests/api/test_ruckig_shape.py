@@ -61,7 +61,17 @@ def test_it_says_the_same_as_our_shape(service, changes, ours):
 
 
 def test_without_a_jerk_limit(service):
-    assert answer(service, max_jerk=None)["method"] == "toppra"
+    plain = answer(service, max_jerk=None)
+    assert plain["method"] == "ruckig" and "picked_because" not in plain
+    ours = OURS | {"limits": {k: v for k, v in OURS["limits"].items() if k != "jerk"}, "method": "ruckig"}
+    states = {"current_velocity": [0.1, 0], "target_velocity": [0, -0.2]}
+    moving = ask(service, max_jerk=None, **states)
+    assert moving.status_code == 200
+    state = {"start": {"velocity": [0.1, 0]}, "end": {"velocity": [0, -0.2]}}
+    assert moving.content == service.post(PLAN, json=ours | state).content
+    assert moving.json()["samples"]["velocity"][-1] == pytest.approx([0, -0.2])
+    assert answer(service, max_jerk=[None, None])["method"] == "ruckig"
+    assert answer(service)["picked_because"]  # with a jerk limit: auto
 
 
 @pytest.mark.parametrize(

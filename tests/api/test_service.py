@@ -82,6 +82,15 @@ def test_discovery(service):
         answers.CaseReply.model_validate(case)
 
 
+@pytest.mark.parametrize("path", [path for path, verb in PATHS.items() if verb == "get"])
+def test_unknown_query_parameters_are_refused(service, problem, path):
+    response = service.get(path.format(id="linear", code="timeout") + "?colour=red&x")
+    document = problem(response, "invalid_request")
+    found = [(e["field"], e["code"]) for e in document["errors"]]
+    assert found == [("/?colour", "unknown_field"), ("/?x", "unknown_field")]
+    assert service.get(path.format(id="linear", code="timeout") + "?").status_code in (200, 503)
+
+
 def test_discovery_is_json_only(service, problem):
     for path in ("/v1/methods", "/v1/methods/linear", "/v1/cases", "/v1/limits", "/v1/version"):
         problem(service.get(path, headers={"accept": "text/csv"}), "not_acceptable")
@@ -175,6 +184,7 @@ def test_openapi(service):
                     assert answer["content"] == {
                         "application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}
                     }
+            assert "422" in operation["responses"]
             if verb == "post":
                 assert operation["requestBody"]["required"] is True
                 assert {"406", "413", "415", "422", "504"} <= set(operation["responses"])

@@ -193,6 +193,17 @@ def test_ros2(service):
     assert set(message["points"][0]) == {"positions", "velocities", "accelerations", "time_from_start"}
 
 
+def test_ros2_counts_from_the_trajectorys_start(service):
+    def elapsed(**changes):
+        points = plan(service, EXAMPLE | changes, accept=ROS2).json()["points"]
+        return [p["time_from_start"]["sec"] + 1e-9 * p["time_from_start"]["nanosec"] for p in points]
+
+    assert elapsed(sampling={"times": [0.5, 0.75]}) == [0.5, 0.75]
+    assert elapsed(times=[10, 11, 12], sampling={"times": [10.5, 12]}) == [0.5, 2]
+    assert elapsed(times=[10, 11, 12], sampling={"dt": 1}) == [0, 1, 2]
+    assert elapsed(times=[-1, 0, 1], sampling={"dt": 1}) == [0, 1, 2]
+
+
 def test_ros2_refuses_samples_on_one_nanosecond(service, problem):
     body = EXAMPLE | {"sampling": {"times": [0, 1e-10, 1]}}
     document = problem(service.post(PLAN, json=body, headers={"accept": ROS2}), "invalid_request")

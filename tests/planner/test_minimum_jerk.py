@@ -134,11 +134,35 @@ def test_infeasible_is_proved_and_explained():
 
 def test_hopeless_is_said_without_solving():
     with pytest.raises(Infeasible) as caught:
-        plan(PlanRequest.of([0, 1, 0], times=[0, 1, 2], limits={"velocity": 0.9}), "minimum_jerk")
-    assert caught.value.needed == 1 and caught.value.certified and "mean velocity" in caught.value.reason
+        plan(PlanRequest.of([0, 1, 5], times=[0, 4, 9], limits={"position": {"upper": 0.5}}), "minimum_jerk")
+    assert (caught.value.quantity, caught.value.bound, caught.value.needed) == ("position", 0.5, 5)
+
+
+@pytest.mark.parametrize(
+    ("points", "times", "limits"),
+    [
+        ([0, 10], [0, 1], {"velocity": 5}),
+        ([0, 10, 30], [0, 1, 2], {"velocity": 20.5}),
+        ([0, 10, 30], [0, 1, 2], {"velocity": 15}),
+        ([0, 1, 0], [0, 1, 2], {"velocity": 5, "acceleration": 4}),
+        ([0, 1, 0, 1], [0, 1, 2, 3], {"position": {"lower": -0.001, "upper": 1.001}, "jerk": 20}),
+    ],
+)
+def test_what_is_needed_would_do_and_less_would_not(points, times, limits):
     with pytest.raises(Infeasible) as caught:
-        plan(PlanRequest.of([0, 1], times=[0, 9], limits={"position": {"upper": 0.5}}), "minimum_jerk")
-    assert (caught.value.quantity, caught.value.bound, caught.value.needed) == ("position", 0.5, 1)
+        plan(PlanRequest.of(points, times=times, limits=limits), "minimum_jerk")
+    found = caught.value
+    assert found.certified and found.needed is not None
+    for scale, feasible in ((1.0, True), (0.999, False)):
+        needed = abs(found.bound) + scale * (abs(found.needed) - abs(found.bound))
+        wider = {**limits, found.quantity: needed}
+        if found.quantity == "position":
+            wider["position"] = {"lower": -needed, "upper": needed}
+        if feasible:
+            assert plan(PlanRequest.of(points, times=times, limits=wider), "minimum_jerk").certificate.holds
+        else:
+            with pytest.raises(Infeasible):
+                plan(PlanRequest.of(points, times=times, limits=wider), "minimum_jerk")
 
 
 def test_two_waypoints_leave_nothing_free():

@@ -84,3 +84,133 @@ def test_toppra_on_a_path_with_one_tiny_gap():
     done = plan(PlanRequest.of(points, limits=limits), "toppra")
     slow = plan(PlanRequest.of(points, limits=limits), "time_scaled")
     assert done.certificate.holds and done.trajectory.duration < 0.7 * slow.trajectory.duration
+
+
+L = {"velocity": 1, "acceleration": 1}
+
+
+@pytest.mark.parametrize("method", ["toppra", "time_optimal_nlp"])
+def test_a_dwell_that_the_knots_imply(method):
+    path = {"path": {"kind": "linear", "knots": [0, 1, 2, 3]}}
+    done = plan(PlanRequest.of([0, 1, 1, 2], limits=L), method, path)
+    assert 4 <= done.trajectory.duration <= 4.05
+    assert 0 < np.diff(done.waypoint_times)[1] < 1e-4
+
+
+def test_a_timed_dwell_on_a_scaled_path_does_not_scale_the_rest():
+    bounds = [None, {"min": 1}, None]
+    done = plan(PlanRequest.of([0, 1, 1, 2], limits=L, segment_durations=bounds), "time_scaled")
+    assert done.trajectory.duration < 12 and np.diff(done.waypoint_times)[1] >= 1
+
+
+def test_jerk_limits_on_some_segments_only():
+    done = plan(PlanRequest.of([0, 1, 2], limits=L, segment_limits=[{"jerk": 10}, None]), "ruckig")
+    first, second = np.diff(done.waypoint_times)
+    assert first > second == pytest.approx(2)
+    lopsided = [{"jerk": {"lower": -1, "upper": 10}}, None]
+    done = plan(PlanRequest.of([0, 1, 2], limits={**L, "jerk": 10}, segment_limits=lopsided), "ruckig")
+    assert [n.code for n in done.notes] == ["jerk_symmetric"] and done.certificate.objective.lower_bound is None
+
+
+def test_ruckig_between_moving_states_has_gaps_in_its_durations():
+    request = PlanRequest.of(
+        [-0.15828201440750278, -0.2799354792289275],
+        limits={"velocity": 1, "acceleration": 5, "jerk": 10},
+        start={"velocity": [-0.2854508509236171]},
+        end={"velocity": [-0.4324072487957205]},
+        duration={"min": 0.4158060825348307, "max": 0.4158060825348307},
+    )
+    with pytest.raises(Infeasible):
+        plan(request, "ruckig")
+
+
+def test_a_hold_keeps_what_its_segments_may_take():
+    ones = [[1], [1], [1]]
+    body = {"limits": L, "duration": {"min": 5}}
+    done = plan(PlanRequest.of(ones, segment_durations=[{"min": 1}, {"min": 1, "max": 1}], **body), "trapezoidal")
+    np.testing.assert_allclose(np.diff(done.waypoint_times), [4, 1])
+    with pytest.raises(Infeasible):
+        plan(PlanRequest.of([1, 1], segment_durations=[{"max": 1}], **body), "trapezoidal")
+
+
+def test_spread_times_keep_segment_durations():
+    body = {"duration": {"min": 4, "max": 4}, "segment_durations": [{"max": 0.5}, None]}
+    done = plan(PlanRequest.of([0, 1, 5], **body), "linear")
+    np.testing.assert_allclose(done.waypoint_times, [0, 0.5, 4])
+    with pytest.raises(PlannerError):
+        plan(PlanRequest.of([0, 1, 5], **{**body, "segment_durations": [{"max": 0.5}, {"max": 1}]}), "linear")
+
+
+def test_a_path_that_moves_though_all_waypoints_are_equal():
+    polynomial = {"breaks": [0, 1], "coefficients": [[[0]], [[1]], [[-1]]]}
+    done = plan(PlanRequest.of([0, 0], limits=L), "toppra", {"path": {"polynomial": polynomial}})
+    assert done.certificate.cost["path_length"] == pytest.approx(0.5) and done.trajectory.duration > 1
+
+
+def test_ramps_shorter_than_the_clock_can_tell():
+    done = plan(PlanRequest.of([1.8, 2.0], limits={"velocity": 1e-3, "acceleration": 1e6}), "trapezoidal")
+    assert done.trajectory.duration == pytest.approx(200, rel=1e-6) and 0 <= done.certificate.objective.gap < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("breaks", "positions", "slopes"),
+    [
+        ([0, 1, 1.000000001, 2], [1e6, 1000001, 1000001], [1, 1, 2]),
+        ([0, 1e-6, 2e-6, 1e10], [0, 1e-6, 3e-6], [1, 2, 0]),
+    ],
+)
+def test_a_jump_cannot_hide_in_a_tiny_piece(breaks, positions, slopes):
+    hostile = Trajectory.from_powers(breaks, np.array([positions, slopes], dtype=float)[:, :, None])
+    found = certify(hostile, limits={"acceleration": 0.1})
+    assert not found.holds and found.continuity == 0
+
+
+def test_sent_velocities_are_judged():
+    from planner import Recorded
+
+    t = 0.1 * np.arange(50)
+    velocity = np.ones((50, 1))
+    velocity[25] = 1.5
+    found = certify(Recorded.of(t, t[:, None], velocity), limits={"velocity": 1.1})
+    assert not found.holds and [c.holds for c in found.checks] == [False, False]
+    wild = certify(Recorded.of(t, 0 * t[:, None], 100.0 * (-1) ** np.arange(50)[:, None]), limits={"velocity": 1})
+    assert not wild.holds
+
+
+def test_path_length_of_rounding_noise_ends():
+    chebyshev = np.polynomial.Chebyshev.basis(18, domain=[0, 1]).convert(kind=np.polynomial.Polynomial).coef
+    found = certify(Trajectory.from_powers([0, 1], chebyshev[:, None, None]))
+    assert np.isfinite(found.cost["path_length"])
+
+
+def test_one_waypoint_alone_can_be_certified():
+    line = Trajectory.from_hermite([0, 1], [[0.0], [1.0]])
+    assert certify(line, waypoints=[[0.5]]).holds and not certify(line, waypoints=[[1.5]]).holds
+
+
+def test_hopeless_waypoints_are_looked_for_quickly():
+    import time
+
+    rng = np.random.default_rng(0)
+    wave = Trajectory.from_hermite(np.arange(4001.0), (np.arange(4001) % 2)[:, None].astype(float))
+    started = time.process_time()
+    assert not certify(wave, waypoints=[[1.01]] * 30 + rng.normal(size=(10, 1)).tolist()).holds
+    assert time.process_time() - started < 10  # a guard against hours, not a measurement
+
+
+def test_samples_that_fall_on_one_instant():
+    from planner import Sampling, sample
+
+    with pytest.raises(PlannerError):
+        sample(Trajectory.from_hermite([1e6, 1e6 + 1e-9], [[0.0], [1.0]]), Sampling.of({"count": 200}))
+    hold = sample(Trajectory.hold([1.0], 0, 0), Sampling.of({"times": [5]}))
+    assert hold.time.tolist() == [0, 0]
+
+
+def test_casadi_is_asked_by_one_thread_at_a_time():
+    from concurrent.futures import ThreadPoolExecutor
+
+    request = PlanRequest.of([[0, 0], [1, 2], [2, -1]], limits={"velocity": 3, "acceleration": 8, "jerk": 100})
+    with ThreadPoolExecutor(4) as pool:
+        made = list(pool.map(lambda _: plan(request, "time_optimal_nlp", {"stations": 30}), range(8)))
+    assert len({m.trajectory.coefficients.tobytes() for m in made}) == 1
