@@ -18,7 +18,7 @@ from ..types import PlanRequest, Solution
 #: Refinement ends when slowing by this much is all that is left to do, or at so many stations.
 GOOD = 1.002
 MOST = 1000
-ROUNDS = 3
+ROUNDS = 5
 
 
 class TimeOptimalNlpOptions(PathOptions):
