@@ -12,7 +12,7 @@ from .schemas import CertifyBody, PolynomialBody, SamplesBody
 from .settings import Caps
 
 #: Highest degree of a caller's polynomial; a quintic path under a jerk-limited law has 15.
-MAX_DEGREE = 15
+MAX_DEGREE = 31
 
 #: Largest rounding of a polynomial's values that is judged, relative to max(1, the range of its values at the breaks).
 NOISE = 1e-7

@@ -237,37 +237,37 @@ def _difference_row(
 
 
 def _sent_rows(recorded: Recorded) -> list[Check]:
-    """Return whether sent derivatives agree with what they are derivatives of, at the inner samples.
+    """Return whether sent derivatives agree with what they are derivatives of.
 
-    The parabola through three neighbours has the slope (h1 d0 + h0 d1) / (h0 + h1) in the middle, off by
-    h0 h1 / 6 times the third derivative. That is taken from the third differences around, four times over; the sent
-    values themselves have no part in it.
+    A derivative at a sample lies between the differences of the intervals beside it, or beyond them by no more than
+    twice what neighbouring differences anywhere differ by, as long as the samples resolve the motion (plus 1e-6 of
+    their peak, and noise of 4e-9 of the range in what is differenced). What was sent has no part in what is allowed.
     """
     rows: list[Check] = []
-    t = recorded.time
-    if len(t) < 4:
-        return rows
+    t, span = recorded.time, position_span(recorded.position)
     h = np.diff(t)[:, None]
-    base = recorded.position
-    for order, sent in ((1, recorded.velocity), (2, recorded.acceleration)):
-        if sent is not None:
-            for _ in range(1 if order == 1 or recorded.velocity is not None else 2):
-                slopes = np.diff(base, axis=0) / h
-                middle = (h[1:] * slopes[:-1] + h[:-1] * slopes[1:]) / (h[1:] + h[:-1])
-                second = np.diff(slopes, axis=0) / (0.5 * (h[1:] + h[:-1]))
-                third = np.abs(np.diff(second, axis=0)) / h[1:-1]
-                around = np.concatenate([third[:1], third, third[-1:]])
-                around = np.maximum(around[:-1], around[1:])
-                base = np.concatenate([slopes[:1], middle, slopes[-1:]])
-            off = np.abs(sent[1:-1] - middle)
-            allowed = 4.0 * around * h[1:] * h[:-1] / 6.0 * (1 if order == 1 or recorded.velocity is not None else 9)
-            allowed = allowed + TOLERANCE * np.maximum(np.abs(middle).max(axis=0), 1e-9)
-            ratio = off / allowed
-            row, joint = (int(i) for i in np.unravel_index(int(np.argmax(ratio)), ratio.shape))
-            name, worst = f"sent_{QUANTITIES[order]}", float(ratio[row, joint])
-            value, bound = float(off[row, joint]), float(allowed[row, joint])
-            rows.append(Check(name, joint, None, float(t[row + 1]), value, bound, worst, worst <= 1.0))
-        base = sent if sent is not None else base
+    slopes = np.diff(recorded.position, axis=0) / h
+    found = [] if recorded.velocity is None else [(1, recorded.velocity, slopes, 4e-9 * span / h.min())]
+    if recorded.acceleration is not None:
+        if recorded.velocity is not None:
+            noise = 4e-9 * float(np.abs(recorded.velocity).max()) / h.min()
+            found.append((2, recorded.acceleration, np.diff(recorded.velocity, axis=0) / h, noise))
+        elif len(t) > 2:
+            second = np.diff(slopes, axis=0) / (0.5 * (h[1:] + h[:-1]))
+            found.append((2, recorded.acceleration, second, 16e-9 * span / h.min() ** 2))
+    for order, sent, differences, noise in found:
+        reach = len(t) - len(differences)  # 1: between the samples; 2: second differences, on the inner samples
+        padded = np.pad(differences, ((reach, reach), (0, 0)), mode="edge")
+        beside = np.stack([padded[k : k + len(t)] for k in range(reach + 1)])
+        low, high = beside.min(axis=0), beside.max(axis=0)
+        off = np.maximum(np.maximum(sent - high, low - sent), 0.0)
+        spread = np.abs(np.diff(differences, axis=0)).max(axis=0, initial=0.0)
+        allowed = np.broadcast_to(2 * spread + TOLERANCE * np.abs(differences).max(axis=0) + noise, off.shape)
+        ratio = off / np.maximum(allowed, 1e-300)
+        row, joint = (int(i) for i in np.unravel_index(int(np.argmax(ratio)), ratio.shape))
+        name, worst = f"sent_{QUANTITIES[order]}", float(ratio[row, joint])
+        value, bound = float(off[row, joint]), float(allowed[row, joint])
+        rows.append(Check(name, joint, None, float(t[row]), value, bound, worst, worst <= 1.0))
     return rows
 
 

@@ -236,8 +236,12 @@ class Trajectory:
         floor = 1e3 * eps * np.abs(self.coefficients[-1]) / h**order
         noise = (own <= floor).all(axis=0)  # a joint that stands still but for rounding of where it stands
         rounding = np.where(noise, np.maximum(rounding, floor), rounding)
-        clock = np.minimum(eps * np.abs(self.breaks[1:-1, None]) / np.minimum(h[1:], h[:-1]), 1e-4)
-        allowed = np.maximum(rounding[1:], rounding[:-1]) + order * clock * np.maximum(own[1:], own[:-1])
+        tick = eps * np.abs(
+            self.breaks[1:-1, None]
+        )  # what the clock cannot tell moves the break, and scales the pieces
+        here, next_ = (np.maximum(*(np.abs(e) for e in (x[1:], y[:-1]))) for x, y in map(self.ends, (order, order + 1)))
+        clock = tick * next_ + order * tick / np.minimum(h[1:], h[:-1]) * here
+        allowed = np.maximum(rounding[1:], rounding[:-1]) + np.minimum(clock, 1e-2 * peak)
         return np.asarray(jumps > JUMP * peak + allowed)
 
     def extrema(self, orders: int = 4) -> Extrema:

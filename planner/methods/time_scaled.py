@@ -38,10 +38,11 @@ def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
     factor = duration / span
     for i, bounds in enumerate(request.segment_durations or ()):
         stretched(factor * steps[i], bounds, i)
-    start = path.curve.start if request.times is None else float(request.times[0])
-    begin = 0.0 if request.times is None else start
-    trajectory = path.curve.scaled(factor).shifted(begin - start)
+    begin = 0.0 if request.times is None else float(request.times[0])
+    trajectory = path.curve.scaled(factor).shifted(begin - path.curve.start)
     knots = begin + (path.knots - path.knots[0]) * factor
+    if request.times is not None and factor == 1.0:
+        knots = request.times
     trajectory = Trajectory(_exactly(trajectory.breaks, path.curve.breaks, path.knots, knots), trajectory.coefficients)
     law = Trajectory.from_hermite([trajectory.start, trajectory.end], [[path.curve.start], [path.curve.end]])
     notes: tuple[Note, ...] = ()
@@ -51,18 +52,23 @@ def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
 
 
 def _path(request: PlanRequest, options: TimeScaledOptions) -> Path:
-    """Return the path; where its knots are ours to choose, a dwell gets what makes it last its least duration."""
-    path = build_path(options.path, request.waypoints, "clamped", request.times)
+    """Return the path; where its knots are ours to choose, a dwell's are spread as its duration bounds ask."""
+    times = None if request.times is None else request.times - request.times[0]  # from 0, to lose no digits
+    path = build_path(options.path, request.waypoints, "clamped", times)
     still = ~np.diff(request.waypoints, axis=0).any(axis=1)
     if request.times is not None or options.fixes_knots or request.segment_durations is None or not still.any():
         return path
-    least, _ = segment_bounds_of(request)
+    least, most = segment_bounds_of(request)
     steps = np.diff(path.knots)
-    for _ in range(6):  # the scale hardly depends on the dwells' knots
-        moving = float(max(slowdown(path.curve, request, path.knots).factor, (least / steps)[~still].max()))
-        if moving <= 0:
+    usual = float(steps[~still].mean())
+    for _ in range(40):
+        scale = float(max(slowdown(path.curve, request, path.knots).factor, (least / steps)[~still].max()))
+        if scale <= 0:
             break
-        steps[still] = np.clip(least[still] / moving, 1e-6 * steps.max(), None)
+        wanted = np.clip(usual, least[still] / scale, most[still] / scale)
+        if (np.abs(wanted - steps[still]) <= 1e-13 * steps[still]).all():
+            break
+        steps[still] = wanted
         path = build_path(options.path, request.waypoints, "clamped", np.concatenate([[0.0], np.cumsum(steps)]))
     return path
 

@@ -68,7 +68,7 @@ def _relaxed(cuts: Cuts, deadline: Deadline, orders: Iterable[int]) -> tuple[flo
 
     n = 2 * (len(cuts.problem.h) - 1)
     exact = cuts.exact()
-    rows = exact.rows_at(FIRST if n <= 400 else FIRST[::4])
+    rows = exact.rows_at(FIRST)
     relaxing = np.zeros(4)
     relaxing[list(orders)] = 1.0
     t, pressing = 0.0, None

@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 #: Neighbouring gaps with a smaller ratio leave too few digits for the elimination.
 UNEVEN = 1e-6
 ROUNDS = 40
+#: Most gaps for which the smallest relaxation is looked for.
+EXPLAINED = 60
 
 
 def minimum_jerk(request: PlanRequest, backend: str) -> Solution:
@@ -161,12 +163,36 @@ def _within_limits(cuts: Cuts, backend: str, deadline: Deadline) -> tuple[_Joint
 
 
 def _explain(cuts: Cuts, deadline: Deadline) -> bool:
-    """Raise Infeasible where that is proved; return whether the limits were found to be possible."""
+    """Raise Infeasible where that is proved; return whether the limits were found to be possible.
+
+    Above ``EXPLAINED`` gaps the linear programs take too long: then only a mean speed beyond its limit is a proof.
+    """
+    if len(cuts.problem.h) > EXPLAINED:
+        _refuse_mean_speed(cuts)
+        return True
     try:
         least_relaxation(cuts, deadline)
     except SolverFailed:
         return False
     return True
+
+
+def _refuse_mean_speed(cuts: Cuts) -> None:
+    """Raise Infeasible where the mean velocity of a gap breaks its limit: somewhere the velocity takes that value."""
+    mean = np.diff(cuts.problem.positions[:, 0]) / cuts.problem.h
+    over = np.maximum(mean - cuts.bounds.upper[1], cuts.bounds.lower[1] - mean)
+    gap = int(np.argmax(over))
+    if over[gap] > 1e-9 * cuts.scale()[1, gap]:
+        bound = float((cuts.bounds.upper if mean[gap] > 0 else cuts.bounds.lower)[1, gap])
+        raise Infeasible(
+            f"the mean velocity of joint {cuts.joint} on segment {gap} breaks its limit",
+            joint=cuts.joint,
+            quantity="velocity",
+            segment=gap,
+            time=cuts.bounds.clock(gap, 0.5),
+            bound=cuts.bounds.physical(1, bound),
+            certified=True,
+        )
 
 
 def _rounds(cuts: Cuts, backend: Backend, deadline: Deadline) -> tuple[_Joint, str, int, float]:

@@ -74,7 +74,7 @@ def _plain(s: Segment, second: float) -> bool:
     numbers = [s.p1 - s.p0, s.velocity.upper, s.velocity.lower, s.acceleration.upper, s.acceleration.lower, s.jerk]
     sizes = np.abs(np.concatenate([*numbers, s.v0, s.v1, s.a0, s.a1]))
     sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
-    return bool(sizes.min() >= PLAIN[0] and sizes.max() <= PLAIN[1] and PLAIN[0] <= second <= 1e3)
+    return bool(sizes.min() >= PLAIN[0] and sizes.max() <= PLAIN[1] and PLAIN[0] <= second <= 5e3)
 
 
 def _units(s: Segment) -> tuple[float, Array]:

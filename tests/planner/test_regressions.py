@@ -201,8 +201,8 @@ def test_hopeless_waypoints_are_looked_for_quickly():
 def test_samples_that_fall_on_one_instant():
     from planner import Sampling, sample
 
-    with pytest.raises(PlannerError):
-        sample(Trajectory.from_hermite([1e6, 1e6 + 1e-9], [[0.0], [1.0]]), Sampling.of({"count": 200}))
+    found = sample(Trajectory.from_hermite([1e6, 1e6 + 1e-9], [[0.0], [1.0]]), Sampling.of({"count": 200}))
+    assert (np.diff(found.time) > 0).all() and found.time[-1] == 1e6 + 1e-9
     hold = sample(Trajectory.hold([1.0], 0, 0), Sampling.of({"times": [5]}))
     assert hold.time.tolist() == [0, 0]
 
@@ -214,3 +214,73 @@ def test_casadi_is_asked_by_one_thread_at_a_time():
     with ThreadPoolExecutor(4) as pool:
         made = list(pool.map(lambda _: plan(request, "time_optimal_nlp", {"stations": 30}), range(8)))
     assert len({m.trajectory.coefficients.tobytes() for m in made}) == 1
+
+
+@pytest.mark.parametrize("count", [10, 30, 100, 1000])
+@pytest.mark.parametrize("method", ["ruckig", "toppra", "trapezoidal", "minimum_jerk", "cubic_spline"])
+def test_honest_samples_agree_with_themselves(method, count):
+    from planner import Recorded
+
+    rng = np.random.default_rng(count)
+    for _ in range(4):
+        points = rng.normal(size=(4, 2)) + rng.choice([0, 100.0])
+        given = {"limits": {"velocity": 2, "acceleration": 5}}
+        if method in ("minimum_jerk", "cubic_spline"):
+            given = {"times": np.cumsum(rng.uniform(0.5, 1, 4))}
+        t = plan(PlanRequest.of(points, **given), method).trajectory
+        at = np.linspace(t.start, t.end, count)
+        position, velocity, acceleration = t.states(np.clip(at, t.start, t.end), 3)
+        noisy = position + 1e-9 * rng.normal(size=position.shape)
+        honest = [Recorded.of(at, position, velocity), Recorded.of(at, noisy, velocity)]
+        if count >= 100:  # fewer do not resolve the accelerations
+            honest.append(Recorded.of(at, position, velocity, acceleration))
+            honest.append(Recorded.of(at, position, None, acceleration))
+        for recorded in honest:
+            found = certify(recorded)
+            assert found.holds, [c for c in found.checks if not c.holds]
+        if count == 1000:
+            assert not certify(Recorded.of(at, position, 0.9 * velocity)).holds
+
+
+@pytest.mark.parametrize("velocity", [[50, 50, 50], [1, 1, 50], [50, 1, 1]])
+def test_sent_velocities_are_judged_at_the_ends_too(velocity):
+    from planner import Recorded
+
+    t = np.arange(3.0)
+    assert not certify(Recorded.of(t, t[:, None], np.array(velocity, dtype=float)[:, None])).holds
+
+
+def test_a_jump_cannot_hide_behind_a_clock_of_years():
+    chebyshev = np.polynomial.Chebyshev.basis(8, domain=[0, 1]).convert(kind=np.polynomial.Polynomial).coef
+    coefficients = np.zeros((9, 2, 1))
+    coefficients[:, 0, 0] = chebyshev[::-1]
+    coefficients[-1, 1, 0] = 1.0
+    hidden = Trajectory(1.7e9 + np.array([0, 0.01, 1]), coefficients)
+    assert not certify(hidden, limits={"velocity": 1e6, "acceleration": 1e9}).holds
+
+
+def test_many_waypoints_that_are_too_fast_are_refused_at_once():
+    rng = np.random.default_rng(7)
+    request = PlanRequest.of(rng.normal(size=(200, 1)), times=np.arange(200.0), limits={"velocity": 0.5})
+    with pytest.raises(Infeasible) as caught:
+        plan(request, "minimum_jerk")
+    assert caught.value.certified and caught.value.quantity == "velocity"
+
+
+@pytest.mark.parametrize("bounds", [{"min": 1, "max": 1}, {"min": 0.001}, {"min": 1e-6, "max": 1e-2}])
+def test_dwells_on_a_scaled_path_with_jerk(bounds):
+    request = PlanRequest.of(
+        [0, 0.5, 0.5, 1], limits={"velocity": 1, "acceleration": 2, "jerk": 10}, segment_durations=[None, bounds, None]
+    )
+    done = plan(request, "time_scaled")
+    assert done.certificate.holds
+    if bounds["min"] == 0.001:
+        assert done.trajectory.duration < 6
+
+
+def test_steps_of_a_microsecond_on_a_clock_of_days():
+    request = PlanRequest.of([1, 2], times=[1e6, 1000000.000001], limits={"acceleration": 1e-3})
+    try:
+        assert plan(request, "time_scaled").certificate.holds
+    except Unsupported as refusal:
+        assert refusal.what == "precision"

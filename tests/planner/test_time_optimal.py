@@ -61,8 +61,9 @@ def test_ruckig_and_trapezoid_are_the_closed_forms(seed):
         assert done.certificate.objective.gap <= 1e-9
     expected = float(triple_integrator(*(np.array(x) for x in (d, v, a, j))))
     done = plan(PlanRequest.of([0, d], limits={**limits, "jerk": j}), "ruckig")
-    assert done.trajectory.duration == pytest.approx(expected, rel=1e-6)
-    assert done.certificate.objective.gap <= 1e-6
+    # where cruises are 1e8 times longer than ramps, limits are capped for ruckig's sake: up to some 1e-4 longer
+    assert expected * (1 - 1e-9) <= done.trajectory.duration <= expected * (1 + 3e-4)
+    assert done.certificate.objective.gap <= 3e-4
 
 
 def test_triple_integrator_regimes():
