@@ -11,7 +11,7 @@ from .reading import refuse_above, refuse_oversize
 from .schemas import CertifyBody, PolynomialBody, SamplesBody
 from .settings import Caps
 
-#: Highest degree of a caller's polynomial; a quintic path under a jerk-limited law has 15.
+#: Highest degree of a caller's polynomial: a quintic path under a jerk-limited law has 15, a caller's own path more.
 MAX_DEGREE = 31
 
 #: Largest rounding of a polynomial's values that is judged, relative to max(1, the range of its values at the breaks).
