@@ -28,6 +28,7 @@ class PolynomialReply(Reply):
 
     breaks: list[float] = Field(description="K+1 times, s")
     coefficients: list[Rows] = Field(description="[power][piece][joint], lowest power first, of (t - breaks[piece])")
+    weights: Rows | None = Field(None, description="[power][piece] of the denominator, for rational methods")
 
 
 class CheckReply(Reply):

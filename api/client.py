@@ -25,6 +25,7 @@ class Given(TypedDict, total=False):
     waypoint_states: Any
     waypoint_tolerance: Any
     tube: Any
+    wrap: Any
     robot: Any
     joint_names: Any
     sampling: Any

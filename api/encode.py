@@ -80,8 +80,10 @@ def samples_tree(samples: Samples) -> dict[str, Array]:
 
 
 def polynomial_tree(trajectory: Trajectory) -> dict[str, Array]:
-    """Return a trajectory's pieces: ``coefficients[k][i][d]`` belongs to (t - breaks[i])^k."""
-    return {"breaks": trajectory.breaks, "coefficients": np.ascontiguousarray(trajectory.powers())}
+    """Return a trajectory's pieces: ``coefficients[k][i][d]`` belongs to (t - breaks[i])^k, as do ``weights[k][i]``."""
+    tree = {"breaks": trajectory.breaks, "coefficients": np.ascontiguousarray(trajectory.powers())}
+    weights = trajectory.weight_powers()
+    return tree if weights is None else {**tree, "weights": np.ascontiguousarray(weights)}
 
 
 def plan_tree(plan: Plan, samples: Samples | None, polynomial: bool, digest: str) -> dict[str, Any]:

@@ -11,8 +11,9 @@ from .reading import refuse_above, refuse_oversize
 from .schemas import CertifyBody, PolynomialBody, SamplesBody
 from .settings import Caps
 
-#: Highest degree of a caller's polynomial: a quintic path under a jerk-limited law has 15, a caller's own path more.
-MAX_DEGREE = 31
+#: Highest degree of a caller's polynomial: a quintic path under a jerk-limited law has 15, one polynomial through many
+#: waypoints more.
+MAX_DEGREE = 63
 
 #: Largest rounding of a polynomial's values that is judged, relative to max(1, the range of its values at the breaks).
 NOISE = 1e-7
@@ -80,9 +81,15 @@ def _polynomial(polynomial: PolynomialBody, caps: Caps) -> Trajectory:
     if not still and not (steps > 0).all():
         i = int(np.argmax(steps <= 0)) + 1
         raise InvalidRequest.of(f"{_POLYNOMIAL}/breaks/{i}", "not_increasing", "must be larger than the break before")
+    below = polynomial.weights
+    if below is not None and [len(row) for row in below] != [pieces] * len(polynomial.coefficients):
+        reason = f"needs {len(polynomial.coefficients)} rows of {pieces} entries, as the coefficients"
+        raise InvalidRequest.of(f"{_POLYNOMIAL}/weights", "shape_mismatch", reason)
     try:
-        trajectory = Trajectory.from_powers(polynomial.breaks, polynomial.coefficients)
-    except InvalidRequest:
+        trajectory = Trajectory.from_powers(polynomial.breaks, polynomial.coefficients, below)
+    except InvalidRequest as error:
+        if error.errors[0].code == "bad_weights":
+            raise InvalidRequest.of(f"{_POLYNOMIAL}/weights", "bad_weights", error.errors[0].reason) from None
         raise InvalidRequest.of(where, "out_of_range", f"its values must stay within ±{MAX_VALUE:g}") from None
     if not float(trajectory.extrema(1).peak(0).max()) <= MAX_VALUE:
         raise InvalidRequest.of(where, "out_of_range", f"its values must stay within ±{MAX_VALUE:g}")
@@ -96,6 +103,8 @@ def _refuse_cancellation(trajectory: Trajectory, where: str) -> None:
     The constant terms are left out: they are values of the trajectory and cancel nothing.
     """
     sums = np.abs(trajectory.coefficients[:-1]).sum(axis=0)
+    if trajectory.weights is not None:
+        sums = sums / np.minimum(trajectory.weights[-1], trajectory.weights.sum(axis=0))[:, None]
     noise = np.finfo(float).eps * float(sums.max(initial=0.0))
     at_breaks = np.concatenate(trajectory.ends(0))
     allowed = NOISE * max(1.0, float(np.ptp(at_breaks, axis=0).max()))

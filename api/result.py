@@ -80,7 +80,7 @@ class Result:
 
 def read_polynomial(tree: Mapping[str, Any] | None) -> Trajectory | None:
     """Return the exact pieces of an answer as a trajectory."""
-    return None if tree is None else Trajectory.from_powers(tree["breaks"], tree["coefficients"])
+    return None if tree is None else Trajectory.from_powers(tree["breaks"], tree["coefficients"], tree.get("weights"))
 
 
 def read_samples(tree: Mapping[str, Any] | None) -> Samples | None:

@@ -39,6 +39,13 @@ PerJoint = Annotated[
 ]
 
 
+Flag = Annotated[bool, Field(strict=True)]
+Flags = Annotated[
+    Annotated[Flag, Tag("#flag")] | Annotated[list[Flag], Field(fail_fast=True), Tag("#list")],
+    Discriminator(lambda value: "#list" if isinstance(value, list) else "#flag"),
+]
+
+
 class Body(BaseModel):
     """Base of all bodies: frozen, and with no field that is not declared."""
 
@@ -131,6 +138,9 @@ class MotionBody(Body):
     waypoint_tolerance: PerJoint | None = Field(None, description="Half-width of a box around each interior waypoint")
     tube: PerJoint | None = Field(None, description="Half-width of a tube around the path between waypoints")
     robot: dict[str, Any] | None = Field(None, description="A robot, for torque and tip limits")
+    wrap: Flags | None = Field(
+        None, description="Which joints turn without end, one for all or D: waypoints are reached by the shortest turn"
+    )
     joint_names: list[Text] | None = Field(None, description="D names, used by the ROS 2 and CSV formats")
     sampling: SamplingBody | None = Field(None, description="Where to sample the answer; by default 200 samples")
     include: Annotated[list[Included], Field(max_length=16)] | None = Field(
@@ -187,6 +197,9 @@ class PolynomialBody(Body):
         list[Annotated[list[Annotated[list[Coefficient], Field(fail_fast=True)]], Field(fail_fast=True)]],
         Field(fail_fast=True),
     ] = Field(description="[power][piece][joint], lowest power first, of (t - breaks[piece])")
+    weights: Annotated[list[Annotated[list[Coefficient], Field(fail_fast=True)]], Field(fail_fast=True)] | None = Field(
+        None, description="[power][piece] of the denominator, > 0 on every piece, for a rational trajectory"
+    )
 
 
 class SamplesBody(Body):

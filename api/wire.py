@@ -69,7 +69,8 @@ def _trajectory(value: Any) -> Any:
     if isinstance(value, Result):
         value = value.samples if value.polynomial is None else value.polynomial
     if isinstance(value, Trajectory):
-        return {"polynomial": {"breaks": value.breaks, "coefficients": value.powers()}}
+        pieces = {"breaks": value.breaks, "coefficients": value.powers(), "weights": value.weight_powers()}
+        return {"polynomial": {k: v for k, v in pieces.items() if v is not None}}
     if isinstance(value, Samples):
         return {"samples": {name: getattr(value, name) for name in ("time", "position", "velocity", "acceleration")}}
     return value

@@ -100,7 +100,7 @@ def measure(problem: Problem, rounds: int = ROUNDS) -> list[Row]:
 def _declined(error: Exception) -> bool:
     """Return whether a method of ours says that the problem is not one of its kind."""
     if isinstance(error, InvalidRequest):
-        return all(e.code == "missing" for e in error.errors)
+        return all(e.code in ("missing", "bad_degree", "too_few_points") for e in error.errors)
     return isinstance(error, Unsupported)
 
 

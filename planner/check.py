@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .curves.knots import centripetal
+from .curves.options import Spaced
+from .curves.spacing import Spacing, knots, shortest_turns
 from .errors import Infeasible, InvalidRequest, Unsupported
 from .limits import QUANTITIES, Boundary, magnitude, segment_bounds
 from .method import Capabilities, Method
@@ -52,11 +53,19 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     can, original = method.capabilities(options), request
     _refuse_unsupported(request, method, can, methods)
     _require(request, can)
+    spacing = options.spacing if isinstance(options, Spaced) else "centripetal"
+    if request.times is not None and can.timing == "given" and spacing != "centripetal":
+        raise InvalidRequest.of("/options/spacing", "conflict", "times are given: nothing is left to be spread")
     notes = []
+    if request.wrap is not None:
+        turned = shortest_turns(request.waypoints, request.wrap)
+        if (turned != request.waypoints).any():
+            notes.append(Note("turns_added", "waypoints of joints that wrap were moved by whole turns to the nearest"))
+        request = original = replace(request, waypoints=turned)
     if 0 < np.ptp(request.waypoints, axis=0).max() < TINY:
         request = replace(request, waypoints=np.broadcast_to(request.waypoints[0], request.waypoints.shape).copy())
         notes.append(Note("moves_snapped", f"all waypoints lie within {TINY:g} of one another and were made equal"))
-    if request.times is None and can.timing != "parameter" and not options.fixes_knots:
+    if request.times is None and not options.control_points and not options.fixes_knots:
         request, kept = _merged(request)
         if len(request.waypoints) < len(kept):
             count = len(kept) - len(request.waypoints)
@@ -69,14 +78,15 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     if request.times is None and can.timing == "given":
         assert request.duration is not None  # _require saw to it
         if not still:
-            request = replace(request, times=_spread(request))
-            notes.append(Note("times_chosen", "no times were given: spread centripetally over the duration"))
+            request = replace(request, times=_spread(request, spacing))
+            how = {"centripetal": "centripetally", "chord_length": "by chord length", "uniform": "uniformly"}[spacing]
+            notes.append(Note("times_chosen", f"no times were given: spread {how} over the duration"))
     request = replace(request, start=start, end=end)
-    _refuse_hopeless(request)
+    _refuse_hopeless(request, options.control_points)
     demands = Demands(
         dims=request.dims,
         limits=request.limits,
-        waypoints=None if can.timing == "parameter" else original.waypoints,
+        waypoints=None if options.control_points else original.waypoints,
         times=request.times[kept] if can.timing == "given" and request.times is not None else None,
         segment_limits=original.segment_limits,
         segment_durations=original.segment_durations,
@@ -143,10 +153,10 @@ def _require(request: PlanRequest, can: Capabilities) -> None:
             raise InvalidRequest.of(f"/segment_durations/{i}", "conflict", f"the times give the segment {step:g} s")
 
 
-def _spread(request: PlanRequest) -> Array:
-    """Return times over the exact duration: centripetal steps, stretched alike as far as segment durations allow."""
+def _spread(request: PlanRequest, spacing: Spacing) -> Array:
+    """Return times over the exact duration: the spacing's steps, stretched alike as far as segment durations allow."""
     assert request.duration is not None
-    total, steps = request.duration.min, np.diff(centripetal(request.waypoints))
+    total, steps = request.duration.min, np.diff(knots(request.waypoints, spacing))
     bounds = request.segment_durations or [None] * len(steps)
     least = np.array([0.0 if b is None else b.min for b in bounds])
     most = np.array([np.inf if b is None else b.max for b in bounds])
@@ -223,10 +233,11 @@ def _moving(state: Boundary) -> bool:
     return any(np.nan_to_num(getattr(state, name)).any() for name in state.given())
 
 
-def _refuse_hopeless(request: PlanRequest) -> None:
-    """Refuse what no motion can cure: a waypoint or an end state beyond its limit."""
+def _refuse_hopeless(request: PlanRequest, control_points: bool) -> None:
+    """Refuse what no motion can cure: a waypoint (unless it need not be passed) or an end state beyond its limit."""
     last = request.count - 2
-    _refuse_beyond(request, 0, np.stack([request.waypoints[:-1], request.waypoints[1:]]), 0, "a waypoint")
+    if not control_points:
+        _refuse_beyond(request, 0, np.stack([request.waypoints[:-1], request.waypoints[1:]]), 0, "a waypoint")
     for side, segment in ((request.start, 0), (request.end, last)):
         for order in (1, 2, 3):
             state = getattr(side, QUANTITIES[order], None)

@@ -146,6 +146,10 @@ class DurationBounds:
             raise InvalidRequest.of(field, "bad_duration", "min must not be larger than max")
         return bounds if bounds.min > 0 or np.isfinite(bounds.max) else None
 
+    def nearest(self, value: float) -> float:
+        """Return the duration within the bounds that is nearest to ``value``."""
+        return min(max(value, self.min), self.max)
+
     @property
     def exact(self) -> bool:
         """Whether both bounds are the same."""

@@ -51,6 +51,19 @@ class Capabilities:
         return tuple(w for w in CAPABILITIES if w in self.honours | boundary)
 
 
+def at_given_times(
+    continuity: int, start: frozenset[str] = frozenset(), end: frozenset[str] = frozenset()
+) -> Capabilities:
+    """Return what a curve through waypoints at given times honours."""
+    honours = frozenset({"times", "duration", "segment_durations"})
+    return Capabilities("given", continuity, frozenset({"times"}), honours, start=start, end=end)
+
+
+def by_control_points(continuity: int) -> Capabilities:
+    """Return what a curve by control points honours: its clock is a parameter, whose span may be asked."""
+    return Capabilities("parameter", continuity, honours=frozenset({"duration"}))
+
+
 @dataclass(frozen=True)
 class Method:
     """A row of the method table.

@@ -65,6 +65,11 @@ class Options(BaseModel):
         """Whether the options hold a curve, which may move where all waypoints are equal."""
         return False
 
+    @property
+    def control_points(self) -> bool:
+        """Whether the waypoints are control points, which the curve need not pass."""
+        return False
+
 
 def pointer(parts: tuple[Any, ...]) -> str:
     """Return the JSON pointer (RFC 6901) of a location; parts that are union tags (``#…``) are not part of it."""

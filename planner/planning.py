@@ -66,7 +66,9 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
     with np.errstate(all="ignore"):  # what overflows does not verify
         solution = hold(asked) if asked.still else _solve(row, asked.request, chosen)
     solved = time.perf_counter()
-    times = None if solution.waypoint_times is None else solution.waypoint_times[asked.kept]
+    times = None
+    if solution.waypoint_times is not None and not chosen.control_points:
+        times = solution.waypoint_times[asked.kept]
     with np.errstate(all="ignore"):
         certificate = verify(solution.trajectory, asked.demands, times, solution.path)
     if request.timeout is not None and time.perf_counter() - started > request.timeout:

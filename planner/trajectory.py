@@ -1,21 +1,20 @@
-"""The one trajectory type: a piecewise polynomial of vectors, exact from every method to the answer."""
+"""The one trajectory type: piecewise polynomial (or rational) vectors, exact from every method to the answer."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import comb, factorial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import pieces as arithmetic
 from .errors import InvalidRequest
+from .rational import enclosures, positive, quotient, squared_integral
 
 Array = NDArray[np.float64]
 
 #: Shortest piece whose derivatives stay in the range of floating point.
 SHORTEST = 1e-75
-#: A jump counts above this part of the derivative's peak.
-JUMP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +22,7 @@ class Extrema:
     """Exact extrema of a trajectory's pieces; each array has shape (orders, K, D).
 
     ``low[m, i, d]`` is the smallest value of the m-th derivative of joint d on piece i, taken at time ``at_low``.
+    Those of rational pieces are bounds that no value passes; over all pieces they are tight to 1e-10.
     """
 
     low: Array
@@ -42,21 +42,26 @@ class Trajectory:
 
     On piece i, with the local variable u = (t - breaks[i]) / (breaks[i+1] - breaks[i]) in [0, 1],
     x(t) = \sum_k coefficients[k, i] u^(n-k): highest power first, as in SciPy's PPoly, but scaled to the unit interval.
+    With ``weights`` the pieces are rational: that sum divided by \sum_k weights[k, i] u^(n-k).
 
     Parameters
     ----------
     breaks : array (K + 1,)
         Increasing times in s (for paths: parameter values). A single break pair may be equal: a hold without duration.
     coefficients : array (n + 1, K, D)
+    weights : array (n + 1, K), optional
+        The denominator, > 0 on every piece.
 
     Raises
     ------
     InvalidRequest
-        Shapes that do not fit, breaks that do not increase, or numbers that are not finite.
+        Shapes that do not fit, breaks that do not increase, numbers that are not finite, or (``bad_weights``) a
+        denominator that is not positive everywhere.
     """
 
     breaks: Array
     coefficients: Array
+    weights: Array | None = None
 
     def __post_init__(self) -> None:
         breaks = np.array(self.breaks, dtype=np.float64)
@@ -70,6 +75,14 @@ class Trajectory:
             raise InvalidRequest.of(
                 "", "not_increasing", f"a trajectory's breaks must increase, by {SHORTEST:g} or more"
             )
+        if self.weights is not None:
+            weights = np.array(self.weights, dtype=np.float64, order="C")
+            if weights.shape != coefficients.shape[:2]:
+                raise InvalidRequest.of("", "shape_mismatch", "expected weights (n + 1, K), as the coefficients")
+            if not (np.isfinite(weights).all() and positive(arithmetic.to_bernstein(weights))):
+                raise InvalidRequest.of("", "bad_weights", "the denominator must be positive on every piece")
+            weights.setflags(write=False)
+            object.__setattr__(self, "weights", weights)
         for array in (breaks, coefficients):
             array.setflags(write=False)
         object.__setattr__(self, "breaks", breaks)
@@ -83,50 +96,54 @@ class Trajectory:
         return cls(np.array([start, end]), np.asarray(position, dtype=np.float64)[None, None, :])
 
     @classmethod
-    def from_powers(cls, breaks: ArrayLike, powers: ArrayLike) -> "Trajectory":
-        """Return the trajectory with ``powers[k, i, d]`` = coefficient of (t - breaks[i])^k, lowest power first."""
+    def from_powers(cls, breaks: ArrayLike, powers: ArrayLike, weights: ArrayLike | None = None) -> "Trajectory":
+        """Return the trajectory with ``powers[k, i, d]`` = coefficient of (t - breaks[i])^k, lowest power first.
+
+        ``weights[k, i]`` are those of the denominator, if there is one.
+        """
         breaks = np.asarray(breaks, dtype=np.float64)
         powers = np.asarray(powers, dtype=np.float64)
         if powers.ndim != 3 or powers.shape[1] != len(breaks) - 1:
             raise InvalidRequest.of("", "shape_mismatch", "coefficients must be indexed [power][piece][joint]")
         scale = np.diff(breaks) ** np.arange(len(powers))[:, None]
-        return cls(breaks, np.asarray(powers * scale[:, :, None], dtype=np.float64)[::-1])
+        scaled = np.asarray(powers * scale[:, :, None], dtype=np.float64)[::-1]
+        if weights is None:
+            return cls(breaks, scaled)
+        below = np.asarray(weights, dtype=np.float64)
+        if below.shape != powers.shape[:2]:
+            raise InvalidRequest.of("", "shape_mismatch", "weights must be indexed [power][piece], as the coefficients")
+        return cls(breaks, scaled, (below * scale)[::-1])
+
+    @classmethod
+    def from_bernstein(cls, breaks: ArrayLike, points: ArrayLike) -> "Trajectory":
+        """Return the trajectory whose pieces have the Bézier control points ``points[k, i, d]``, (n + 1, K, D)."""
+        return cls(
+            np.asarray(breaks, dtype=np.float64), arithmetic.from_bernstein(np.asarray(points, dtype=np.float64))
+        )
 
     @classmethod
     def from_hermite(cls, breaks: ArrayLike, *derivatives: ArrayLike) -> "Trajectory":
         """Return the spline with the given values and derivatives at its breaks, each (N, D).
 
-        Position alone gives lines, with velocity cubics, with acceleration too quintics; neighbours share the values,
-        so the result is of class C0, C1, C2.
+        Position alone gives lines, with velocity cubics, with acceleration quintics, with jerk septics; neighbours
+        share the values, so the result is of class C0, C1, C2, C3.
         """
+        from .kernels.splines import hermite_pieces
+
         breaks = np.asarray(breaks, dtype=np.float64)
-        h = np.diff(breaks)[:, None]
-        at = [np.asarray(x, dtype=np.float64) for x in derivatives]
-        q, delta = at[0][:-1], np.diff(at[0], axis=0)
-        if len(at) == 1:
-            rows = [delta, q]
-        elif len(at) == 2:
-            v0, v1 = at[1][:-1] * h, at[1][1:] * h
-            rows = [v0 + v1 - 2 * delta, 3 * delta - 2 * v0 - v1, v0, q]
-        else:
-            v0, v1 = at[1][:-1] * h, at[1][1:] * h
-            a0, a1 = at[2][:-1] * h * h / 2, at[2][1:] * h * h / 2
-            rows = [
-                6 * delta - 3 * (v0 + v1) - a0 + a1,
-                -15 * delta + 8 * v0 + 7 * v1 + 3 * a0 - 2 * a1,
-                10 * delta - 6 * v0 - 4 * v1 - 3 * a0 + a1,
-                a0,
-                v0,
-                q,
-            ]
-        return cls(breaks, np.stack(rows))
+        at = [np.ascontiguousarray(x, dtype=np.float64) for x in derivatives]
+        states = np.stack(at[1:]) if len(at) > 1 else np.empty((0, *at[0].shape))
+        out = np.empty((2 * len(at), len(breaks) - 1, at[0].shape[1]))
+        hermite_pieces(np.diff(breaks), at[0], states, out)
+        return cls(breaks, out)
 
     @classmethod
     def concatenate(cls, parts: Sequence["Trajectory"]) -> "Trajectory":
         """Return the parts one after the other; each starts where, in time, the one before it ends."""
         degree = max(p.degree for p in parts)
         breaks = np.concatenate([parts[0].breaks[:1]] + [p.breaks[1:] for p in parts])
-        return cls(breaks, np.concatenate([_raised(p.coefficients, degree) for p in parts], axis=1))
+        whole = np.concatenate([arithmetic.raised(p._homogeneous, degree) for p in parts], axis=1)
+        return cls(breaks, whole[..., :-1], None if all(p.weights is None for p in parts) else whole[..., -1])
 
     # -- shape -------------------------------------------------------------------------------------------------------
 
@@ -166,10 +183,29 @@ class Trajectory:
         h = np.diff(self.breaks)
         return np.divide(1.0, h, out=np.zeros_like(h), where=h > 0)
 
+    @cached_property
+    def _homogeneous(self) -> Array:
+        """Numerator and denominator as one more joint, (n + 1, K, D + 1)."""
+        below = self.weights
+        if below is None:
+            below = np.zeros(self.coefficients.shape[:2])
+            below[-1] = 1.0
+        return np.concatenate([self.coefficients, below[:, :, None]], axis=2)
+
+    @property
+    def _whole(self) -> Array:
+        return self.coefficients if self.weights is None else self._homogeneous
+
     def powers(self) -> Array:
         """Return ``[k, i, d]`` = coefficient of (t - breaks[i])^k, lowest power first."""
         scale = self._rate ** np.arange(self.degree + 1)[:, None]
         return np.asarray(self.coefficients[::-1] * scale[:, :, None])
+
+    def weight_powers(self) -> Array | None:
+        """Return ``[k, i]`` = the denominator's coefficient of (t - breaks[i])^k, or None."""
+        if self.weights is None:
+            return None
+        return np.asarray(self.weights[::-1] * self._rate ** np.arange(self.degree + 1)[:, None])
 
     # -- evaluation --------------------------------------------------------------------------------------------------
 
@@ -185,8 +221,10 @@ class Trajectory:
         """
         return np.asarray(self.states(times, 1, order)[0])
 
-    def states(self, times: ArrayLike, orders: int = 4, first: int = 0) -> Array:
+    def states(self, times: ArrayLike, orders: int = 4, first: int = 0, out: Array | None = None) -> Array:
         """Return the derivatives of order ``first`` … ``first + orders - 1`` at ``times``, shape (orders, …, D).
+
+        ``out`` (orders, M, D), C-contiguous, is filled and returned in place of a new array.
 
         Raises
         ------
@@ -196,82 +234,135 @@ class Trajectory:
         from .kernels.evaluation import evaluate
 
         t = np.asarray(times, dtype=np.float64)
-        if not ((t >= self.start) & (t <= self.end)).all():
+        if t.size and not (t.min() >= self.start and t.max() <= self.end):  # also false for NaN
             raise InvalidRequest.of("times", "out_of_range", f"times must lie in [{self.start!r}, {self.end!r}]")
-        out = np.empty((orders, t.size, self.dims))
-        evaluate(self.breaks, self.coefficients, np.ascontiguousarray(t).reshape(-1), first, out)
-        return out.reshape(orders, *t.shape, self.dims)
+        shape = (orders, t.size, self.dims)
+        if out is not None and (out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous):
+            raise ValueError(f"out must be a C-contiguous array of float64 of shape {shape}")
+        flat = np.ascontiguousarray(t).reshape(-1)
+        if self.weights is None:
+            out = np.empty(shape) if out is None else out
+            evaluate(self.breaks, self.coefficients, flat, first, out)
+            return out.reshape(orders, *t.shape, self.dims)
+        both = np.empty((first + orders, t.size, self.dims + 1))
+        evaluate(self.breaks, self._homogeneous, flat, 0, both)
+        found = quotient(both[..., :-1], both[..., -1])[first:]
+        if out is not None:
+            out[...] = found
+        return found.reshape(orders, *t.shape, self.dims)
 
     def derivative(self, order: int = 1) -> "Trajectory":
-        """Return the derivative of the given order as a trajectory."""
-        scale = (self._rate**order)[:, None]
-        return Trajectory(self.breaks, _differentiated(self.coefficients, order) * scale)
+        """Return the derivative of the given order as a trajectory; (A / W)' = (A' W - A W') / W²."""
+        if self.weights is None or order == 0:
+            scale = (self._rate**order)[:, None]
+            return Trajectory(self.breaks, arithmetic.differentiated(self.coefficients, order) * scale, self.weights)
+        a, w = self.coefficients, self.weights
+        top = arithmetic.product(arithmetic.differentiated(a, 1), w)
+        minus = arithmetic.product(a, arithmetic.differentiated(w, 1))
+        bottom = arithmetic.product(w[:, :, None], w)[:, :, 0]
+        size = len(bottom) - 1
+        grown = arithmetic.raised((top - minus) * self._rate[:, None], size)
+        return Trajectory(self.breaks, grown, bottom).derivative(order - 1)
 
     def ends(self, order: int) -> tuple[Array, Array]:
         """Return the derivative at the left and at the right end of every piece, each (K, D)."""
-        c = _differentiated(self.coefficients, order)
         scale = (self._rate**order)[:, None]
-        return c[-1] * scale, c.sum(axis=0) * scale
+        if self.weights is None:
+            c = arithmetic.differentiated(self.coefficients, order)
+            return c[-1] * scale, c.sum(axis=0) * scale
+        found = [arithmetic.differentiated(self._homogeneous, m) for m in range(order + 1)]
+        left, right = np.stack([c[-1] for c in found]), np.stack([c.sum(axis=0) for c in found])
+        at_left, at_right = (quotient(x[..., :-1], x[..., -1])[order] for x in (left, right))
+        return at_left * scale, at_right * scale
 
     def jumps(self, order: int) -> Array:
         """Return the jumps of a derivative at the interior breaks, shape (K - 1, D)."""
         left, right = self.ends(order)
         return np.asarray(left[1:] - right[:-1])
 
-    def counted_jumps(self, order: int, peak: Array, span: float = 1.0) -> NDArray[np.bool_]:
-        """Return which jumps at the interior breaks count as such, shape (K - 1, D).
-
-        Positions: above 1e-6 x ``span``; other derivatives: above 1e-6 of their ``peak`` (D,) and above the rounding
-        of values and of the clock.
-        """
-        if self.pieces == 1:
-            return np.zeros((0, self.dims), dtype=bool)
-        jumps = np.abs(self.jumps(order))
-        if order == 0:
-            return np.asarray(jumps > JUMP * span)
-        eps, h = np.finfo(float).eps, np.diff(self.breaks)[:, None]
-        size = np.abs(self.coefficients[:-1]).max(axis=0, initial=0.0)
-        rounding = 64 * eps * size / h**order
-        own = np.abs(_differentiated(self.coefficients, order)).sum(axis=0) / h**order
-        floor = 1e3 * eps * np.abs(self.coefficients[-1]) / h**order
-        noise = (own <= floor).all(axis=0)  # a joint that stands still but for rounding of where it stands
-        rounding = np.where(noise, np.maximum(rounding, floor), rounding)
-        tick = eps * np.abs(
-            self.breaks[1:-1, None]
-        )  # what the clock cannot tell moves the break, and scales the pieces
-        here, next_ = (np.maximum(*(np.abs(e) for e in (x[1:], y[:-1]))) for x, y in map(self.ends, (order, order + 1)))
-        clock = tick * next_ + order * tick / np.minimum(h[1:], h[:-1]) * here
-        allowed = np.maximum(rounding[1:], rounding[:-1]) + np.minimum(clock, 1e-2 * peak)
-        return np.asarray(jumps > JUMP * peak + allowed)
-
     def extrema(self, orders: int = 4) -> Extrema:
         """Return the exact extrema of the derivatives of order 0 … orders-1, piece by piece."""
         from .kernels.extrema import extrema
 
-        low, at_low, high, at_high = extrema(self.coefficients, orders)
-        scale = (self._rate ** np.arange(orders)[:, None])[:, :, None]
+        scale = self._rate ** np.arange(orders)[:, None]
         h, t = np.diff(self.breaks)[:, None], self.breaks[:-1, None]
-        return Extrema(low * scale, t + at_low * h, high * scale, t + at_high * h)
+        if self.weights is not None:
+            bernstein = arithmetic.to_bernstein(self._homogeneous)
+            low, at_low, high, at_high = enclosures(bernstein[..., :-1], bernstein[..., -1], scale)
+        else:
+            low, at_low, high, at_high = extrema(self.coefficients, orders)
+            low, high = low * scale[:, :, None], high * scale[:, :, None]
+        return Extrema(low, t + at_low * h, high, t + at_high * h)
 
     def squared_integral(self, order: int) -> float:
-        """Return the integral of the squared Euclidean norm of a derivative, exact but for rounding."""
+        """Return the integral of the squared Euclidean norm of a derivative, exact but for rounding.
+
+        For rational pieces: by quadrature, to about 1e-10.
+        """
+        if self.weights is not None:
+            peak = self.extrema(order + 1).peak(order) if self.duration else np.zeros(self.dims)
+            return squared_integral(self._homogeneous, self._rate, order, float((peak**2).sum()))
         if order > self.degree:
             return 0.0
-        c = _differentiated(self.coefficients, order)
+        c = arithmetic.differentiated(self.coefficients, order)
         power = np.arange(len(c) - 1, -1, -1)
         gram = 1.0 / (power[:, None] + power[None, :] + 1.0)
-        pieces = np.einsum("kid,kl,lid->i", c, gram, c)
-        return float(np.sum(pieces * self._rate ** (2 * order - 1)))
+        squares = np.einsum("kid,kl,lid->i", c, gram, c)
+        return float(np.sum(squares * self._rate ** (2 * order - 1)))
 
     # -- changing ----------------------------------------------------------------------------------------------------
 
     def scaled(self, factor: float) -> "Trajectory":
         """Return the trajectory slowed by ``factor`` about its start: the i-th derivative is divided by factor^i."""
-        return Trajectory(self.start + (self.breaks - self.start) * factor, self.coefficients)
+        return replace(self, breaks=self.start + (self.breaks - self.start) * factor)
 
     def shifted(self, offset: float) -> "Trajectory":
         """Return the same trajectory ``offset`` seconds later."""
-        return Trajectory(self.breaks + offset, self.coefficients)
+        return replace(self, breaks=self.breaks + offset)
+
+    def reversed(self) -> "Trajectory":
+        """Return the trajectory run backwards over the same span: x(start + end - t)."""
+        one = np.ones(self.pieces)
+        turned = arithmetic.restricted(self._whole, one, -one)[:, ::-1]
+        breaks = (self.start + self.end - self.breaks)[::-1].copy()
+        breaks[0], breaks[-1] = self.start, self.end
+        return self._like(breaks, turned)
+
+    def mapped(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Trajectory":
+        """Return A x(t) + b for a matrix A (E, D) and an offset b (E,)."""
+        a = np.asarray(matrix, dtype=np.float64)
+        if a.ndim != 2 or a.shape[1] != self.dims:
+            raise InvalidRequest.of("matrix", "shape_mismatch", f"expected E rows of {self.dims} entries")
+        image = np.asarray(self.coefficients @ a.T)
+        b = np.broadcast_to(np.asarray(offset, dtype=np.float64), (len(a),))
+        if self.weights is None:
+            image[-1] += b
+        else:
+            image += self.weights[:, :, None] * b
+        return replace(self, coefficients=image)
+
+    def joints(self, chosen: Sequence[int]) -> "Trajectory":
+        """Return the trajectory of some of the joints, in the order named."""
+        return replace(self, coefficients=self.coefficients[:, :, list(chosen)])
+
+    def sliced(self, start: float, end: float) -> "Trajectory":
+        """Return the part between two times, on the same clock.
+
+        Raises
+        ------
+        InvalidRequest
+            Not ``self.start <= start < end <= self.end``.
+        """
+        if not self.start <= start < end <= self.end:
+            raise InvalidRequest.of("times", "out_of_range", f"must increase within [{self.start!r}, {self.end!r}]")
+        cut = self.split([start, end])
+        first, last = (int(np.searchsorted(cut.breaks, t)) for t in (start, end))
+        return cut.part(first, last)
+
+    def part(self, first: int, last: int) -> "Trajectory":
+        """Return the pieces ``first`` … ``last - 1``."""
+        weights = None if self.weights is None else self.weights[:, first:last]
+        return Trajectory(self.breaks[first : last + 1], self.coefficients[:, first:last], weights)
 
     def split(self, times: ArrayLike) -> "Trajectory":
         """Return the same trajectory with further breaks at ``times``; those outside or at a break change nothing."""
@@ -280,11 +371,7 @@ class Trajectory:
         extra = extra[~np.isin(extra, self.breaks)]
         if not len(extra):
             return self
-        breaks = np.sort(np.concatenate([self.breaks, extra]))
-        piece = np.searchsorted(self.breaks, breaks[:-1], side="right") - 1
-        u0 = (breaks[:-1] - self.breaks[piece]) * self._rate[piece]
-        width = np.diff(breaks) * self._rate[piece]
-        return Trajectory(breaks, _restricted(self.coefficients[:, piece], u0, width))
+        return self._like(*arithmetic.cut(self.breaks, self._whole, extra))
 
     def compose(self, law: "Trajectory") -> "Trajectory":
         """Return self(law(t)): this path run through by a non-decreasing law s(t), exactly.
@@ -297,72 +384,17 @@ class Trajectory:
         Returns
         -------
         Trajectory of degree n_path * n_law, on the merged breaks.
+
+        Raises
+        ------
+        InvalidRequest
+            ``not_increasing`` where the law falls, ``out_of_range`` where it leaves the path, ``shape_mismatch`` for
+            a law that is not one polynomial in time.
         """
-        law = law.split(_crossings(law, self.breaks))
-        s_left, s_right = law.ends(0)
-        middle = 0.5 * (s_left[:, 0] + s_right[:, 0])
-        piece = np.clip(np.searchsorted(self.breaks, middle, side="right") - 1, 0, self.pieces - 1)
-        w = law.coefficients[:, :, 0] * self._rate[piece]
-        w[-1] = (law.coefficients[-1, :, 0] - self.breaks[piece]) * self._rate[piece]
-        result = self.coefficients[:1, piece]
-        for k in range(1, self.degree + 1):
-            result = _product(result, w)
-            result[-1] += self.coefficients[k, piece]
-        return Trajectory(law.breaks, result)
+        if law.dims != 1 or law.weights is not None:
+            raise InvalidRequest.of("law", "shape_mismatch", "a time law has one joint and no weights")
+        return self._like(*arithmetic.composed(self.breaks, self._whole, law.breaks, law.coefficients[:, :, 0]))
 
-
-def _differentiated(c: Array, order: int) -> Array:
-    """Return the u-derivative of coefficients, highest power first; at least one (zero) row."""
-    n = len(c) - 1
-    if order > n:
-        return np.zeros_like(c[:1])
-    factors = [factorial(k) // factorial(k - order) for k in range(n, order - 1, -1)]
-    return np.asarray(c[: n + 1 - order] * np.array(factors, dtype=np.float64)[:, None, None])
-
-
-def _raised(c: Array, degree: int) -> Array:
-    """Return the coefficients with zero rows in front, up to ``degree``."""
-    return np.concatenate([np.zeros((degree + 1 - len(c), *c.shape[1:])), c])
-
-
-def _restricted(c: Array, u0: Array, width: Array) -> Array:
-    """Return the coefficients in x of c(u0 + width x), piece by piece."""
-    n = len(c) - 1
-    low = c[::-1]
-    shifted = np.zeros_like(low)
-    for k in range(n + 1):  # Taylor shift: the new coefficient k is sum_m C(m, k) u0^(m-k) c_m
-        for m in range(k, n + 1):
-            shifted[k] += comb(m, k) * (u0 ** (m - k))[:, None] * low[m]
-    return np.asarray((shifted * (width ** np.arange(n + 1)[:, None])[:, :, None])[::-1])
-
-
-def _product(p: Array, w: Array) -> Array:
-    """Return the product of vector polynomials p (a, K, D) and scalar ones w (b, K), highest power first."""
-    out = np.zeros((len(p) + len(w) - 1, *p.shape[1:]))
-    for k in range(len(w)):
-        out[k : k + len(p)] += p * w[k][:, None]
-    return out
-
-
-def _crossings(law: Trajectory, values: Array) -> Array:
-    """Return the times at which a non-decreasing scalar law passes the values strictly inside its pieces."""
-    left, right = (x[:, 0] for x in law.ends(0))
-    slack = 1e-13 * max(float(np.abs(values).max()), 1e-300)
-    first = np.searchsorted(values, left + slack, side="right")
-    last = np.searchsorted(values, right - slack, side="left")
-    count = np.maximum(last - first, 0)
-    if not count.any():
-        return np.empty(0)
-    piece = np.repeat(np.arange(law.pieces), count)
-    target = np.concatenate([values[a : a + n] for a, n in zip(first, count, strict=True)])
-    c = law.coefficients[:, piece, 0]
-    lo, hi = np.zeros(len(piece)), np.ones(len(piece))
-    for _ in range(60):  # monotone: plain bisection to the last bit
-        u = 0.5 * (lo + hi)
-        value = c[0]
-        for k in range(1, len(c)):
-            value = value * u + c[k]
-        below = value < target
-        lo, hi = np.where(below, u, lo), np.where(below, hi, u)
-    h = np.diff(law.breaks)[piece]
-    return np.asarray(law.breaks[piece] + 0.5 * (lo + hi) * h)
+    def _like(self, breaks: Array, whole: Array) -> "Trajectory":
+        """Return a trajectory from coefficients, which hold a denominator where this one has one."""
+        return Trajectory(breaks, whole[:, :, : self.dims], None if self.weights is None else whole[:, :, self.dims])

@@ -68,6 +68,7 @@ class PlanRequest:
     waypoint_tolerance: Array | None = None
     tube: Array | None = None
     robot: Mapping[str, Any] | None = None
+    wrap: NDArray[np.bool_] | None = None
     joint_names: tuple[str, ...] | None = None
     timeout: float | None = None
 
@@ -90,7 +91,8 @@ class PlanRequest:
         waypoints : (N, D) or (N,) for one joint, N >= 2
         **given
             ``times`` (N,) s, ``limits``, ``segment_limits``, ``segment_durations``, ``duration``, ``start``, ``end``,
-            ``waypoint_states``, ``waypoint_tolerance``, ``tube``, ``robot``, ``joint_names``, ``timeout`` s.
+            ``waypoint_states``, ``waypoint_tolerance``, ``tube``, ``robot``, ``wrap`` (which joints turn without
+            end: each waypoint is then reached by the shortest turn), ``joint_names``, ``timeout`` s.
 
         Raises
         ------
@@ -119,6 +121,7 @@ class PlanRequest:
             "waypoint_tolerance": lambda v: _half_width(v, dims, "/waypoint_tolerance"),
             "tube": lambda v: _half_width(v, dims, "/tube"),
             "robot": lambda v: v,
+            "wrap": lambda v: _flags(v, dims, "/wrap"),
             "joint_names": lambda v: _names(v, dims),
             "timeout": lambda v: positive(v, "/timeout"),
         }
@@ -151,6 +154,13 @@ def _half_width(value: Any, dims: int, field: str) -> Array:
     if not (width >= 0).all():
         raise InvalidRequest.of(field, "out_of_range", "must be >= 0 for every joint")
     return width
+
+
+def _flags(value: Any, dims: int, field: str) -> NDArray[np.bool_]:
+    flags = [value] * dims if isinstance(value, bool) else entries(value, dims, field)
+    if not all(isinstance(f, (bool, np.bool_)) for f in flags):
+        raise InvalidRequest.of(field, "wrong_type", "must be true or false, or one of them for every joint")
+    return np.array(flags, dtype=bool)
 
 
 def _names(value: Any, dims: int) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .jumps import counted_jumps
 from .limits import QUANTITIES, Boundary, DurationBounds, magnitude, segment_bounds
 from .trajectory import Trajectory
 from .types import Certificate, Check, Demands, Followed
@@ -102,7 +103,7 @@ def _measure(trajectory: Trajectory, demands: Demands, at: Array | None) -> _Mot
     span = position_span(trajectory if demands.waypoints is None else demands.waypoints)
     jumps = np.zeros((4, trajectory.pieces - 1, trajectory.dims), dtype=bool)
     for m in range(3):
-        jumps[m + 1] = jumps[m] | trajectory.counted_jumps(m, peaks[m], span)
+        jumps[m + 1] = jumps[m] | counted_jumps(trajectory, m, peaks[m], span)
     middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
     segment = np.zeros(len(middles), dtype=np.int64)
     if at is not None:
@@ -134,7 +135,7 @@ def _continuity(trajectory: Trajectory, span: float) -> int | None:
         return None
     found = trajectory.extrema(trajectory.degree + 1)
     for order in range(trajectory.degree + 1):
-        if trajectory.counted_jumps(order, found.peak(order), span).any():
+        if counted_jumps(trajectory, order, found.peak(order), span).any():
             return order - 1
     return trajectory.degree
 

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from ..curves.cubic_spline import CubicSplineOptions, cubic_spline, ends_of
+from ..curves import cubic_spline
+from ..curves.cubic import CubicSplineOptions, ends_of
 from ..limits import Boundary
-from ..method import Capabilities, Method, Reference
+from ..method import Capabilities, Method, Reference, at_given_times
 from ..types import Note, PlanRequest, Solution, Stats
 
 TAKES = {"clamped": frozenset({"velocity"}), "second_derivative": frozenset({"acceleration"})}
@@ -41,8 +42,7 @@ def capabilities(options: CubicSplineOptions) -> Capabilities:
     start, end = (TAKES.get(kind, frozenset()) for kind in ends_of(options.boundary))
     if options.boundary == "start_conditions":
         start, end = frozenset({"velocity", "acceleration"}), frozenset()
-    honours = frozenset({"times", "duration", "segment_durations"})
-    return Capabilities("given", 2, frozenset({"times"}), honours, start=start, end=end)
+    return at_given_times(2, start, end)
 
 
 CUBIC_SPLINE = Method(

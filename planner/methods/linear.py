@@ -1,7 +1,8 @@
 """Method ``linear``."""
 
-from ..curves.linear import LinearOptions, linear
-from ..method import Capabilities, Method, Reference
+from ..curves import linear
+from ..curves.polyline import LinearOptions
+from ..method import Method, Reference, at_given_times
 from ..types import PlanRequest, Solution, Stats
 
 
@@ -20,7 +21,5 @@ LINEAR = Method(
     summary="Straight lines between the waypoints; the velocity jumps at each of them.",
     formula="q(t) = (1 - u) q_i + u q_{i+1},  u = (t - t_i) / (t_{i+1} - t_i)",
     reference=Reference("K. Hauser", "Robotic Systems, section III", 2022, "https://motion.cs.illinois.edu/"),
-    capabilities=lambda options: Capabilities(
-        "given", 0, frozenset({"times"}), frozenset({"times", "duration", "segment_durations"})
-    ),
+    capabilities=lambda options: at_given_times(0),
 )

@@ -4,13 +4,13 @@ from typing import Literal
 
 from pydantic import Field
 
+from ..curves.options import Spaced
 from ..method import Capabilities, Method, Reference
-from ..options import Options
 from ..smoothing.minimum_jerk import minimum_jerk
 from ..types import PlanRequest, Solution
 
 
-class MinimumJerkOptions(Options):
+class MinimumJerkOptions(Spaced):
     """Options of the minimum-jerk trajectory."""
 
     backend: Literal["auto", "piqp", "osqp"] = Field(

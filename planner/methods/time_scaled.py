@@ -1,11 +1,22 @@
 """Method ``time_scaled``."""
 
+from dataclasses import replace
+
 import numpy as np
 from pydantic import Field
 
 from ..errors import InvalidRequest
 from ..method import Capabilities, Method, Reference
-from ..paths import CubicSplinePath, LinearPath, Path, PathOptions, build_path, refuse_position_limits
+from ..paths import (
+    CubicSplinePath,
+    Path,
+    PathOptions,
+    QuinticSplinePath,
+    SepticSplinePath,
+    build_path,
+    refuse_position_limits,
+    smoothness,
+)
 from ..timing.scaling import slowdown, stretched
 from ..timing.stops import segment_bounds_of
 from ..trajectory import Trajectory
@@ -20,6 +31,8 @@ class TimeScaledOptions(PathOptions):
 
 def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
     """Return the path run through at a uniformly scaled clock: as slow as the limits ask, no slower."""
+    if request.times is not None and options.path.control_points:
+        raise InvalidRequest.of("/times", "conflict", "the waypoints are control points, which have no times")
     if request.times is not None and options.path.knots is not None:
         raise InvalidRequest.of("/options/path/knots", "conflict", "the times are the path's knots: send one of both")
     path = _path(request, options)
@@ -43,12 +56,14 @@ def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
     knots = begin + (path.knots - path.knots[0]) * factor
     if request.times is not None and factor == 1.0:
         knots = request.times
-    trajectory = Trajectory(_exactly(trajectory.breaks, path.curve.breaks, path.knots, knots), trajectory.coefficients)
+    trajectory = replace(trajectory, breaks=_exactly(trajectory.breaks, path.curve.breaks, path.knots, knots))
     law = Trajectory.from_hermite([trajectory.start, trajectory.end], [[path.curve.start], [path.curve.end]])
     notes: tuple[Note, ...] = ()
     if needed.binding is not None and factor == least == needed.factor:
         notes = (Note("binding_limit", f"the {needed.binding} limit sets the time scale, {factor:.9g}"),)
-    return Solution(trajectory, knots, Stats("closed_form"), Followed(path.curve, law), notes=notes)
+    return Solution(
+        trajectory, knots if path.passes else None, Stats("closed_form"), Followed(path.curve, law), notes=notes
+    )
 
 
 def _path(request: PlanRequest, options: TimeScaledOptions) -> Path:
@@ -83,16 +98,18 @@ def _exactly(breaks: np.ndarray, curve_breaks: np.ndarray, knots: np.ndarray, ti
 
 
 def capabilities(options: TimeScaledOptions) -> Capabilities:
-    """Return what is honoured; only the clamped spline rests at its ends, and no scaling bounds a corner."""
-    spline = isinstance(options.path, CubicSplinePath)
-    clamped = isinstance(options.path, CubicSplinePath) and options.path.boundary in (None, "clamped")
-    honours = {"times", "position", "velocity", "segment_limits", "segment_durations", "duration"}
-    return Capabilities(
-        "either",
-        2 if spline else 0,
-        honours=frozenset(honours if isinstance(options.path, LinearPath) else honours | {"acceleration", "jerk"}),
-        rests=frozenset({"velocity"}) if clamped else frozenset(),
-    )
+    """Return what is honoured: no scaling bounds what jumps one order below; some paths rest at their ends."""
+    path, smooth = options.path, smoothness(options.path)
+    derivatives = ("velocity", "acceleration", "jerk")
+    honours = {"position", "duration", *(derivatives if smooth is None else derivatives[: smooth + 1])}
+    if not path.control_points:
+        honours |= {"times", "segment_limits", "segment_durations"}
+    rests: tuple[str, ...] = ()
+    if isinstance(path, CubicSplinePath) and path.boundary in (None, "clamped"):
+        rests = derivatives[:1]
+    elif isinstance(path, QuinticSplinePath | SepticSplinePath):
+        rests = derivatives[: 2 if isinstance(path, QuinticSplinePath) else 3]
+    return Capabilities("either", 0 if smooth is None else smooth, honours=frozenset(honours), rests=frozenset(rests))
 
 
 TIME_SCALED = Method(
@@ -109,5 +126,13 @@ TIME_SCALED = Method(
     capabilities=capabilities,
     path="fixed",
     objective="duration",
-    variants=({"path": {"kind": "cubic_spline", "boundary": "natural"}}, {"path": {"kind": "linear"}}),
+    variants=(
+        {"path": {"kind": "cubic_spline", "boundary": "natural"}},
+        {"path": {"kind": "linear"}},
+        {"path": {"kind": "cubic_hermite"}},
+        {"path": {"kind": "quintic_spline"}},
+        {"path": {"kind": "septic_spline"}},
+        {"path": {"kind": "polynomial"}},
+        {"path": {"kind": "nurbs"}},
+    ),
 )

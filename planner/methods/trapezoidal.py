@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from problems.rest_to_rest import double_integrator
 
-from ..curves.linear import linear
+from ..curves.polyline import linear
 from ..limits import segment_bounds
 from ..method import Capabilities, Method, Reference
 from ..options import Options

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolverFailed
+from ..jumps import counted_jumps
 from ..limits import Limits
 from ..paths import Path, refuse_position_limits
 from ..trajectory import Trajectory
@@ -97,7 +98,7 @@ def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: 
         notes[Note("stops_at_corners", f"the path has {len(corners)} corner(s); the motion stops at each")] = None
     return Solution(
         trajectory.scaled(factor),
-        times * factor,
+        times * factor if path.passes else None,
         Stats(solver, "solved", law.pieces, seconds),
         Followed(path.curve, law.scaled(factor)),
         notes=tuple(notes),
@@ -111,7 +112,7 @@ def _corners(curve: Trajectory, order: int) -> Array:
     found = curve.extrema(order + 1)
     jumps = np.zeros(curve.pieces - 1, dtype=bool)
     for m in range(1, order + 1):
-        jumps |= curve.counted_jumps(m, found.peak(m)).any(axis=1)
+        jumps |= counted_jumps(curve, m, found.peak(m)).any(axis=1)
     return np.asarray(curve.breaks[1:-1][jumps])
 
 
@@ -124,10 +125,7 @@ def in_a_row(laws: Sequence[Trajectory]) -> Trajectory:
 def split(curve: Trajectory, corners: Array) -> list[Trajectory]:
     """Return the curve cut at some of its breaks."""
     cuts = np.concatenate([[0], np.searchsorted(curve.breaks, corners), [curve.pieces]])
-    return [
-        Trajectory(curve.breaks[a : b + 1], curve.coefficients[:, a:b])
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True)
-    ]
+    return [curve.part(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
 
 
 def _reached(law: Trajectory, knots: Array) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Infeasible
+from ..jumps import counted_jumps
 from ..limits import QUANTITIES, DurationBounds, Limits, magnitude, segment_bounds
 from ..trajectory import Trajectory
 from ..types import PlanRequest
@@ -41,7 +42,7 @@ def slowdown(trajectory: Trajectory, request: PlanRequest, waypoint_times: Array
     best, jumping = Slowdown(0.0, None), np.zeros(trajectory.dims, dtype=bool)
     for order in (1, 2, 3):
         lower_order = order - 1
-        jumps = trajectory.counted_jumps(lower_order, found.peak(lower_order), 1.0)
+        jumps = counted_jumps(trajectory, lower_order, found.peak(lower_order), 1.0)
         jumping = jumping | jumps.any(axis=0)
         limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
         bounded = (np.isfinite(limit.lower) | np.isfinite(limit.upper)).any(axis=0)

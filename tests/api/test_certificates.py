@@ -163,7 +163,7 @@ def test_samples_that_are_wrong(service, problem, changes, field, code):
 @pytest.mark.parametrize(
     "polynomial",
     [
-        {"breaks": [0, 1], "coefficients": [[[0]]] * 33},
+        {"breaks": [0, 1], "coefficients": [[[0]]] * 65},
         {"breaks": [0, 1], "coefficients": [[[0] * 65]]},
     ],
     ids=["degree", "joints"],

@@ -209,6 +209,7 @@ def test_the_documents_fields_are_the_contracts(service):
         "waypoint_states",
         "waypoint_tolerance",
         "tube",
+        "wrap",
         "robot",
         "joint_names",
         "sampling",

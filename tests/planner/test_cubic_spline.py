@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from planner import InvalidRequest, PlanRequest, Unsupported, plan
-from planner.curves.cubic_spline import cubic_spline
+from planner.curves.cubic import cubic_spline
 
 T, X = [0, 1, 2], [[0], [2], [3]]
 

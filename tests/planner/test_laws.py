@@ -9,14 +9,25 @@ from planner import METHODS, PlanRequest, plan
 from planner.limits import QUANTITIES
 
 SEEDS = st.integers(0, 2**32 - 1)
-TIMED = ("linear", "cubic_spline", "minimum_jerk")
+CURVES = (
+    "linear",
+    "polynomial",
+    "hermite",
+    "cubic_hermite",
+    "cubic_spline",
+    "quintic_spline",
+    "septic_spline",
+    "bspline",
+)
+TIMED = (*CURVES, "minimum_jerk")
+BY_CONTROL_POINTS = ("bezier", "nurbs")
 CHOSEN = ("trapezoidal", "ruckig", "time_scaled", "toppra")
-assert set(TIMED) | set(CHOSEN) | {"time_optimal_nlp"} == set(METHODS)
+assert {*TIMED, *CHOSEN, *BY_CONTROL_POINTS, "time_optimal_nlp"} == set(METHODS)
 
 
 def make(method, rng, jerk=True):
     """Return waypoints, times or limits that the method honours."""
-    n, dims = int(rng.integers(2, 7)), int(rng.integers(1, 5))
+    n, dims = int(rng.integers(4 if method == "bspline" else 2, 7)), int(rng.integers(1, 5))
     points = rng.uniform(-2, 2, (n, dims))
     if method in TIMED:
         return points, {"times": np.cumsum(rng.uniform(0.2, 2, n))}
@@ -123,7 +134,7 @@ def test_a_waypoint_added_on_the_curve_changes_nothing(method, seed):
     assert np.abs(a(at) - b(at)).max() <= 1e-8 * (1 + np.abs(a(at)).max())
 
 
-@pytest.mark.parametrize("method", ["linear", "cubic_spline", "minimum_jerk"])
+@pytest.mark.parametrize("method", TIMED)
 @given(SEEDS)
 def test_affine_maps_of_points_are_affine_maps_of_curves(method, seed):
     rng = np.random.default_rng(seed)

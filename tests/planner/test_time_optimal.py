@@ -130,7 +130,7 @@ def test_given_paths(method):
     limits = {"velocity": 1.0, "acceleration": 2.0}
     periodic = {"kind": "cubic_spline", "boundary": "periodic", "knots": circle.tolist()}
     first = plan(PlanRequest.of(points, limits=limits), method, {"path": periodic})
-    from planner.curves.cubic_spline import cubic_spline
+    from planner.curves.cubic import cubic_spline
 
     curve = cubic_spline(circle, points, "periodic")
     polynomial = {"polynomial": {"breaks": circle.tolist(), "coefficients": curve.powers().tolist()}}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner import Trajectory
+from planner import InvalidRequest, Trajectory
 from planner.limits import Boundary, DurationBounds, Limits
 from planner.types import Demands, Followed
 from planner.verify import path_length, verify
@@ -127,7 +127,9 @@ def test_a_false_claim_about_the_path_is_caught():
     c = verify(other, Demands(dims=2), path=Followed(curve, law))
     assert not c.holds and c.path_deviation == pytest.approx(0.01)
     back = Trajectory.from_hermite([0, 2, 3, 4], [[0], [1.5], [1], [2]])
-    assert verify(curve.compose(back), Demands(dims=2), path=Followed(curve, back)).path_deviation == np.inf
+    assert verify(honest, Demands(dims=2), path=Followed(curve, back)).path_deviation == np.inf
+    with pytest.raises(InvalidRequest, match="runs backwards"):
+        curve.compose(back)
 
 
 def test_path_length_through_rests_and_kinks():

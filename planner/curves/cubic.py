@@ -8,8 +8,10 @@ from pydantic import Discriminator, Field, Tag
 from scipy.linalg import solve_banded
 
 from ..errors import InvalidRequest
-from ..options import MAX_VALUE, Options
+from ..options import MAX_TIME, MAX_VALUE
+from ..reading import increasing, matrix, vector
 from ..trajectory import Trajectory
+from .options import Spaced
 
 Array = NDArray[np.float64]
 
@@ -27,7 +29,7 @@ BoundaryOption = Annotated[
 ]
 
 
-class CubicSplineOptions(Options):
+class CubicSplineOptions(Spaced):
     """Options of the cubic spline."""
 
     boundary: BoundaryOption = Field(
@@ -90,6 +92,25 @@ def cubic_spline(
     else:
         slopes = _two_ends(h, d, ends_of(boundary), np.asarray(start), np.asarray(end))
     return Trajectory.from_hermite(t, x, slopes)
+
+
+def move(*pairs: Any) -> Trajectory:
+    """Return the motion of ``move(t1, x1, t2, x2, …)``: the cubic spline through x_k at t_k, at rest at both ends.
+
+    Each x_k holds one number or the D numbers of all axes, which share the knots.
+
+    Raises
+    ------
+    InvalidRequest
+        ``too_few_points``, ``shape_mismatch``, ``not_increasing`` or ``not_finite``.
+    """
+    times, points = pairs[0::2], pairs[1::2]
+    if len(times) != len(points):
+        raise InvalidRequest.of("/times", "shape_mismatch", "needs a point for every time")
+    if len(times) < 2:
+        raise InvalidRequest.of("/waypoints", "too_few_points", "needs at least two waypoints")
+    t = increasing(vector(list(times), "/times", largest=MAX_TIME), "/times")
+    return cubic_spline(t, matrix([np.atleast_1d(x).tolist() for x in points], "/waypoints"))
 
 
 def _two_ends(h: Array, d: Array, kinds: tuple[str, str], start: Array, end: Array) -> Array:

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..options import Options
 from ..trajectory import Trajectory
+from .options import Spaced
 
 
-class LinearOptions(Options):
-    """Linear interpolation has no options."""
+class LinearOptions(Spaced):
+    """Options of linear interpolation."""
 
 
 def linear(times: ArrayLike, points: ArrayLike) -> Trajectory:

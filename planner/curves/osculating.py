@@ -1,0 +1,55 @@
+"""Global Hermite interpolation: one polynomial that takes values and slopes at all nodes."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+
+from ..trajectory import Trajectory
+from .barycentric import refuse_ill_conditioned
+from .local_hermite import tangents
+from .newton import newton_trajectory
+from .options import Matrix, Spaced, rows_of
+
+Array = NDArray[np.float64]
+
+
+class HermiteOptions(Spaced):
+    """Options of osculating interpolation."""
+
+    velocities: Matrix | None = Field(
+        default=None,
+        description="N×D velocities at the waypoints, unit/s (default: finite differences, with a warning)",
+    )
+
+
+def hermite(times: ArrayLike, points: ArrayLike, velocities: ArrayLike) -> Trajectory:
+    r"""Return the polynomial of degree 2 N - 1 with the given values and slopes.
+
+    .. math:: p(t) = \sum_i x_i [1 - 2 l_i'(t_i)(t - t_i)] l_i(t)^2 + v_i (t - t_i) l_i(t)^2
+
+    evaluated in Newton's form on doubled nodes.
+
+    Parameters
+    ----------
+    times : (N,), increasing
+    points, velocities : (N, D)
+
+    Raises
+    ------
+    InvalidRequest
+        ``bad_degree`` where the nodes are too ill conditioned to be of use.
+
+    References
+    ----------
+    J. Stoer and R. Bulirsch, Introduction to Numerical Analysis, Springer, 2002, section 2.1.5.
+    """
+    t, x = np.asarray(times, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    refuse_ill_conditioned(t, float(t[0]), float(t[-1]), "cubic_hermite", twice=True)
+    return newton_trajectory(t, x, np.asarray(velocities, dtype=np.float64), float(t[0]), float(t[-1]))
+
+
+def from_options(options: HermiteOptions, times: Array, points: Array) -> Trajectory:
+    """Return the curve that the options describe; velocities that were not given are finite differences."""
+    if options.velocities is None:
+        return hermite(times, points, tangents(times, points, "finite_difference"))
+    return hermite(times, points, rows_of(options.velocities, points.shape, "/options/velocities"))

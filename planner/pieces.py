@@ -1,0 +1,175 @@
+"""Arithmetic on the coefficients of piecewise polynomials: arrays in, arrays out.
+
+Coefficients have shape (n + 1, K, …): power (highest first) of the local variable u in [0, 1], piece, then joints or
+nothing. Bernstein coefficients have the same shape, the first belonging to u = 0.
+"""
+
+from functools import cache
+from math import comb, factorial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InvalidRequest
+
+Array = NDArray[np.float64]
+
+
+def differentiated(c: Array, order: int) -> Array:
+    """Return the u-derivative; at least one (zero) row."""
+    n = len(c) - 1
+    if order > n:
+        return np.zeros_like(c[:1])
+    factors = [factorial(k) // factorial(k - order) for k in range(n, order - 1, -1)]
+    return np.asarray(c[: n + 1 - order] * _along(np.array(factors, dtype=np.float64), c))
+
+
+def raised(c: Array, degree: int) -> Array:
+    """Return the coefficients with zero rows in front, up to ``degree``."""
+    return np.concatenate([np.zeros((degree + 1 - len(c), *c.shape[1:])), c])
+
+
+def restricted(c: Array, u0: Array, width: Array) -> Array:
+    """Return the coefficients in x of c(u0 + width x), piece by piece (u0, width: (K,); width may be negative)."""
+    n = len(c) - 1
+    low, tail = c[::-1], (slice(None), *[None] * (c.ndim - 2))
+    shifted = np.zeros_like(low)
+    for k in range(n + 1):  # Taylor shift: the new coefficient k is sum_m C(m, k) u0^(m-k) c_m
+        for m in range(k, n + 1):
+            shifted[k] += comb(m, k) * (u0 ** (m - k))[tail] * low[m]
+    powers = width ** np.arange(n + 1)[:, None]
+    return np.asarray((shifted * powers[(slice(None), *tail)])[::-1])
+
+
+def product(p: Array, w: Array) -> Array:
+    """Return the product of vector polynomials p (a, K, D) and scalar ones w (b, K)."""
+    out = np.zeros((len(p) + len(w) - 1, *p.shape[1:]))
+    for k in range(len(w)):
+        out[k : k + len(p)] += p * w[k][:, None]
+    return out
+
+
+def value(c: Array, u: Array) -> Array:
+    """Return each piece's value at its own u (K, …): shape (K, …) broadcast with the joints'."""
+    result = c[0]
+    for row in c[1:]:
+        result = result * u + row
+    return np.asarray(result)
+
+
+@cache
+def _bernstein_matrix(n: int) -> Array:
+    """Return M with b = M c: Bernstein coefficients from monomial ones, lowest power first."""
+    return np.array([[comb(i, k) / comb(n, k) if k <= i else 0.0 for k in range(n + 1)] for i in range(n + 1)])
+
+
+def to_bernstein(c: Array) -> Array:
+    """Return the Bernstein coefficients: sum_i C(n, i) u^i (1 - u)^(n - i) b_i is the same polynomial."""
+    return np.tensordot(_bernstein_matrix(len(c) - 1), c[::-1], axes=1)
+
+
+def from_bernstein(b: Array) -> Array:
+    """Return the monomial coefficients, highest power first; their conditioning grows like 3^n.
+
+    c_k = C(n, k) times the k-th forward difference of b at 0, so that what is constant stays exactly so.
+    """
+    n, rows = len(b) - 1, []
+    for k in range(n + 1):
+        rows.append(comb(n, k) * b[0])
+        b = np.diff(b, axis=0)
+    return np.ascontiguousarray(np.stack(rows[::-1]))
+
+
+def halved(b: Array) -> tuple[Array, Array]:
+    """Return the Bernstein coefficients on the left and on the right half (de Casteljau)."""
+    return divided(b, 0.5)
+
+
+def divided(b: Array, at: float | Array) -> tuple[Array, Array]:
+    """Return the Bernstein coefficients left and right of u = ``at`` (de Casteljau)."""
+    left, right = np.empty_like(b), np.empty_like(b)
+    row = b
+    for k in range(len(b)):
+        left[k], right[len(b) - 1 - k] = row[0], row[-1]
+        row = (1.0 - at) * row[:-1] + at * row[1:]
+    return left, right
+
+
+def trimmed(c: Array) -> Array:
+    """Return the coefficients without highest powers that are too small to change any value on [0, 1]."""
+    size = np.abs(c).max(axis=tuple(range(1, c.ndim)))
+    keep = np.flatnonzero(size > 1e-22 * size.max(initial=0.0))
+    return c[keep[0] :] if len(keep) else c[-1:]
+
+
+def cut(breaks: Array, c: Array, times: Array) -> tuple[Array, Array]:
+    """Return breaks and coefficients with further breaks at ``times``, which lie strictly inside."""
+    extended = np.sort(np.concatenate([breaks, times]))
+    piece = np.searchsorted(breaks, extended[:-1], side="right") - 1
+    h = np.diff(breaks)[piece]
+    return extended, restricted(c[:, piece], (extended[:-1] - breaks[piece]) / h, np.diff(extended) / h)
+
+
+def composed(breaks: Array, c: Array, law_breaks: Array, law: Array) -> tuple[Array, Array]:
+    """Return breaks and coefficients of c(law(t)), for a non-decreasing scalar law (m + 1, L), exactly.
+
+    The law's pieces are cut where they cross a break of the curve; then both are polynomials on each piece.
+
+    Raises
+    ------
+    InvalidRequest
+        ``out_of_range`` where the law leaves the curve, ``not_increasing`` where it runs backwards.
+    """
+    _refuse_law(breaks, law_breaks, law)
+    inner = crossings(law_breaks, law, breaks)
+    inner = np.unique(inner[~np.isin(inner, law_breaks)])
+    if len(inner):
+        law_breaks, law = cut(law_breaks, law, inner)
+    middle = 0.5 * (law[-1] + law.sum(axis=0))
+    piece = np.clip(np.searchsorted(breaks, middle, side="right") - 1, 0, len(breaks) - 2)
+    h = np.diff(breaks)[piece]
+    w = law / h
+    w[-1] = (law[-1] - breaks[piece]) / h
+    result = c[:1, piece]
+    for k in range(1, len(c)):
+        result = product(result, w)
+        result[-1] += c[k, piece]
+    return law_breaks, result
+
+
+def _refuse_law(breaks: Array, law_breaks: Array, law: Array) -> None:
+    from .kernels.extrema import extrema
+
+    (low, slowest), _, (high, fastest), _ = (x[:, :, 0] for x in extrema(np.ascontiguousarray(law[:, :, None]), 2))
+    slack = 1e-9 * max(float(np.abs(breaks).max()), 1e-300)
+    if not (low.min() >= breaks[0] - slack and high.max() <= breaks[-1] + slack):
+        raise InvalidRequest.of("law", "out_of_range", "the time law leaves the path's parameter range")
+    rate = 1.0 / np.diff(law_breaks)
+    left, right = law[-1], law.sum(axis=0)
+    falls = (slowest * rate < -1e-6 * (fastest * rate).max()) & (low < np.minimum(left, right) - slack)
+    if falls.any() or (right < left - slack).any() or (left[1:] < right[:-1] - slack).any():
+        raise InvalidRequest.of("law", "not_increasing", "the time law runs backwards")
+
+
+def crossings(breaks: Array, c: Array, values: Array) -> Array:
+    """Return the times at which a non-decreasing scalar law (n + 1, K) passes the values strictly inside its pieces."""
+    left, right = c[-1], c.sum(axis=0)
+    slack = 1e-13 * max(float(np.abs(values).max()), 1e-300)
+    first = np.searchsorted(values, left + slack, side="right")
+    last = np.searchsorted(values, right - slack, side="left")
+    count = np.maximum(last - first, 0)
+    if not count.any():
+        return np.empty(0)
+    piece = np.repeat(np.arange(len(left)), count)
+    target = np.concatenate([values[a : a + n] for a, n in zip(first, count, strict=True)])
+    chosen = c[:, piece]
+    lo, hi = np.zeros(len(piece)), np.ones(len(piece))
+    for _ in range(60):  # monotone: plain bisection to the last bit
+        u = 0.5 * (lo + hi)
+        below = value(chosen, u) < target
+        lo, hi = np.where(below, u, lo), np.where(below, hi, u)
+    return np.asarray(breaks[piece] + 0.5 * (lo + hi) * np.diff(breaks)[piece])
+
+
+def _along(factors: Array, c: Array) -> Array:
+    return factors.reshape(-1, *[1] * (c.ndim - 1))

@@ -1,0 +1,193 @@
+"""Rational pieces x = A / W: derivatives by the quotient rule, and certified enclosures of their extrema.
+
+A quotient of polynomials lies between the least and the largest quotient of their Bernstein coefficients as long as
+those of the denominator are positive; halving an interval makes these bounds four times as tight.
+"""
+
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .pieces import differentiated, halved, value
+from .quadrature import integral
+
+Array = NDArray[np.float64]
+
+#: Relative width of the enclosures of the largest and the smallest value of each derivative and joint.
+TIGHT = 1e-10
+#: Pieces are first halved until their denominator varies by no more than this factor.
+EVEN, MOST_HALVINGS = 2.0, 12
+MOST_LEVELS, MOST_INTERVALS = 40, 1 << 15
+
+
+def quotient(numerator: Array, denominator: Array) -> Array:
+    """Return the derivatives of A / W from those of A (R, …, D) and W (R, …), orders 0 … R-1.
+
+    x^(m) = (A^(m) - sum_{j=1..m} C(m, j) W^(j) x^(m-j)) / W.
+    """
+    out = np.empty_like(numerator)
+    for m in range(len(numerator)):
+        rest = numerator[m].copy()
+        for j in range(1, m + 1):
+            rest -= comb(m, j) * denominator[j][..., None] * out[m - j]
+        out[m] = rest / denominator[0][..., None]
+    return out
+
+
+def positive(w: Array) -> bool:
+    """Return whether the denominators (Bernstein coefficients (n + 1, K)) are certainly positive on their pieces."""
+    for _ in range(20):
+        if not ((w[0] > 0) & (w[-1] > 0)).all():
+            return False
+        w = np.concatenate(halved(w[:, ~(w > 0).all(axis=0)]), axis=1)
+        if not w.size:
+            return True
+    return False
+
+
+def enclosures(a: Array, w: Array, scale: Array) -> tuple[Array, Array, Array, Array]:
+    """Return bounds of the derivatives of A / W on every piece, and where they are (almost) taken.
+
+    Parameters
+    ----------
+    a, w : (n + 1, K, D), (n + 1, K)
+        Bernstein coefficients; the denominator is positive.
+    scale : (R, K)
+        Factor of each order's u-derivative: 1 / duration^m.
+
+    Returns
+    -------
+    low, at_low, high, at_high : (R, K, D)
+        No value lies outside; over all pieces the largest and the smallest are tight to 1e-10 of the larger magnitude.
+        The places are values of u.
+    """
+    pieces = a.shape[1]
+    piece, left, width = np.arange(pieces), np.zeros(pieces), np.ones(pieces)
+    for _ in range(MOST_HALVINGS):
+        uneven = (w.max(axis=0) > EVEN * w.min(axis=0)) | (w.min(axis=0) <= 0)
+        if not uneven.any():
+            break
+        a, w = _split(a, uneven), _split(w, uneven)
+        piece, left, width = _split_places(piece, left, width, uneven)
+    anchor = a[0] / w[0][:, None]
+    numerator, bottom = a - anchor * w[:, :, None], w
+    out = []
+    for m, factor in enumerate(scale[:, piece] / width ** np.arange(len(scale))[:, None]):
+        if m > 0:  # (N / W^m)' = (N' W - m N W') / W^(m+1), kept near zero by the anchor
+            numerator = _times(_derivative(numerator), w) - m * _times(numerator, _derivative(w))
+            bottom = _times(bottom[:, :, None], w)[:, :, 0]
+        top = _elevated(numerator, len(bottom) - 1) * factor[:, None]
+        shift = anchor if m == 0 else np.zeros_like(anchor)
+        out.append(_enclosed(top, bottom, shift, (piece, left, width), pieces))
+    low, at_low, high, at_high = (np.stack(x) for x in zip(*out, strict=True))
+    return low, at_low, high, at_high
+
+
+def squared_integral(whole: Array, rate: Array, order: int, largest: float) -> float:
+    """Return the integral of the squared Euclidean norm of a derivative, by quadrature to about 1e-10.
+
+    Parameters
+    ----------
+    whole : (n + 1, K, D + 1)
+        Monomial coefficients, highest power first, the denominator's last.
+    rate : (K,)
+        1 / duration of each piece.
+    largest : float
+        Of the squared norm, for what rounding may do.
+    """
+    if not rate.any():
+        return 0.0
+    rows = [differentiated(whole, m) for m in range(order + 1)]
+
+    def squared(piece: NDArray[np.int64], u: Array) -> Array:
+        found = np.stack([value(c[:, piece, None], u[..., None]) for c in rows])
+        norm = (quotient(found[..., :-1], found[..., -1])[order] ** 2).sum(axis=-1)
+        return np.asarray(norm * rate[piece, None] ** (2 * order - 1))
+
+    return integral(squared, whole.shape[1], 1e-12 * largest / rate)
+
+
+Places = tuple[NDArray[np.int64], Array, Array]
+
+
+def _enclosed(top: Array, bottom: Array, shift: Array, places: Places, pieces: int) -> tuple[Array, ...]:
+    """Return low, at_low, high, at_high (K, D) of shift + top / bottom, by halving where the largest may be."""
+    piece, left, width = places
+    noise = 16 * np.finfo(float).eps * len(top) * np.abs(top).max(axis=0) / bottom.min(axis=0)[:, None]
+    best_low = best_high = None
+    found = []
+    for level in range(MOST_LEVELS):
+        ratio = top / bottom[:, :, None]
+        least, most = ratio.min(axis=0) + shift - noise, ratio.max(axis=0) + shift + noise
+        ends = ratio[[0, -1]] + shift
+        lowest, highest = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
+        best_low = lowest if best_low is None else np.minimum(best_low, lowest)
+        best_high = highest if best_high is None else np.maximum(best_high, highest)
+        slack = TIGHT * np.maximum(np.abs(best_low), np.abs(best_high)) + 4 * noise
+        wide = ((most > best_high + slack) | (least < best_low - slack)).any(axis=1)
+        if level == MOST_LEVELS - 1 or wide.sum() > MOST_INTERVALS:  # what is known holds, only less tightly
+            wide[:] = False
+        found.append((piece[~wide], (left + 0.5 * width)[~wide], least[~wide], most[~wide]))
+        if not wide.any():
+            break
+        top, bottom = (np.concatenate(halved(x[:, wide]), axis=1) for x in (top, bottom))
+        noise, shift = np.tile(noise[wide], (2, 1)), np.tile(shift[wide], (2, 1))
+        half = 0.5 * width[wide]
+        left = np.concatenate([left[wide], left[wide] + half])
+        piece, width = np.tile(piece[wide], 2), np.tile(half, 2)
+    at, middle, least, most = (np.concatenate(x) for x in zip(*found, strict=True))
+    last_first = np.argsort(-middle, kind="stable")  # so that of equals the earliest is written last
+    at, middle = at[last_first], middle[last_first]
+    high, at_high = _largest(at, middle, most[last_first], pieces)
+    low, at_low = _largest(at, middle, -least[last_first], pieces)
+    return -low, at_low, high, at_high
+
+
+def _largest(piece: NDArray[np.int64], at: Array, values: Array, pieces: int) -> tuple[Array, Array]:
+    """Return the largest of the values (I, D) on each piece and where it is."""
+    out, where = np.full((pieces, values.shape[1]), -np.inf), np.zeros((pieces, values.shape[1]))
+    np.maximum.at(out, piece, values)
+    for joint in range(values.shape[1]):
+        row = np.flatnonzero(values[:, joint] == out[piece, joint])
+        where[piece[row], joint] = at[row]
+    return out, where
+
+
+def _split(b: Array, where: NDArray[np.bool_]) -> Array:
+    return np.concatenate([b[:, ~where], *halved(b[:, where])], axis=1)
+
+
+def _split_places(
+    piece: NDArray[np.int64], left: Array, width: Array, where: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], Array, Array]:
+    half = 0.5 * width[where]
+    return (
+        np.concatenate([piece[~where], piece[where], piece[where]]),
+        np.concatenate([left[~where], left[where], left[where] + half]),
+        np.concatenate([width[~where], half, half]),
+    )
+
+
+def _derivative(b: Array) -> Array:
+    """Return the derivative's Bernstein coefficients, n (b_{i+1} - b_i); zero for a constant."""
+    return (len(b) - 1) * np.diff(b, axis=0) if len(b) > 1 else np.zeros_like(b)
+
+
+def _times(b: Array, w: Array) -> Array:
+    """Return the product of b (n + 1, K, D) and w (m + 1, K), in Bernstein coefficients of degree n + m."""
+    n, m = len(b) - 1, len(w) - 1
+    out = np.zeros((n + m + 1, *b.shape[1:]))
+    for j in range(m + 1):
+        for i in range(n + 1):
+            out[i + j] += comb(n, i) * comb(m, j) / comb(n + m, i + j) * b[i] * w[j][:, None]
+    return out
+
+
+def _elevated(b: Array, degree: int) -> Array:
+    """Return the coefficients at a higher degree; the polynomial is the same."""
+    for n in range(len(b), degree + 1):
+        i = (np.arange(n + 1) / n).reshape(-1, *[1] * (b.ndim - 1))
+        padded = np.concatenate([b[:1], b, b[-1:]])
+        b = i * padded[:-1] + (1.0 - i) * padded[1:]
+    return b
