@@ -51,10 +51,10 @@ def product(p: Array, w: Array) -> Array:
 
 def value(c: Array, u: Array) -> Array:
     """Return each piece's value at its own u (K, …): shape (K, …) broadcast with the joints'."""
-    result = c[0]
+    result: Array = np.broadcast_to(c[0], np.broadcast_shapes(c[0].shape, u.shape))
     for row in c[1:]:
         result = result * u + row
-    return np.asarray(result)
+    return result
 
 
 @cache

@@ -178,7 +178,7 @@ class Trajectory:
         return int(self.coefficients.shape[2])
 
     @cached_property
-    def _rate(self) -> Array:
+    def rates(self) -> Array:
         """1 / duration of each piece; 0 for the hold without duration, whose derivatives are zero."""
         h = np.diff(self.breaks)
         return np.divide(1.0, h, out=np.zeros_like(h), where=h > 0)
@@ -198,14 +198,14 @@ class Trajectory:
 
     def powers(self) -> Array:
         """Return ``[k, i, d]`` = coefficient of (t - breaks[i])^k, lowest power first."""
-        scale = self._rate ** np.arange(self.degree + 1)[:, None]
+        scale = self.rates ** np.arange(self.degree + 1)[:, None]
         return np.asarray(self.coefficients[::-1] * scale[:, :, None])
 
     def weight_powers(self) -> Array | None:
         """Return ``[k, i]`` = the denominator's coefficient of (t - breaks[i])^k, or None."""
         if self.weights is None:
             return None
-        return np.asarray(self.weights[::-1] * self._rate ** np.arange(self.degree + 1)[:, None])
+        return np.asarray(self.weights[::-1] * self.rates ** np.arange(self.degree + 1)[:, None])
 
     # -- evaluation --------------------------------------------------------------------------------------------------
 
@@ -254,19 +254,19 @@ class Trajectory:
     def derivative(self, order: int = 1) -> "Trajectory":
         """Return the derivative of the given order as a trajectory; (A / W)' = (A' W - A W') / W²."""
         if self.weights is None or order == 0:
-            scale = (self._rate**order)[:, None]
+            scale = (self.rates**order)[:, None]
             return Trajectory(self.breaks, arithmetic.differentiated(self.coefficients, order) * scale, self.weights)
         a, w = self.coefficients, self.weights
         top = arithmetic.product(arithmetic.differentiated(a, 1), w)
         minus = arithmetic.product(a, arithmetic.differentiated(w, 1))
         bottom = arithmetic.product(w[:, :, None], w)[:, :, 0]
         size = len(bottom) - 1
-        grown = arithmetic.raised((top - minus) * self._rate[:, None], size)
+        grown = arithmetic.raised((top - minus) * self.rates[:, None], size)
         return Trajectory(self.breaks, grown, bottom).derivative(order - 1)
 
     def ends(self, order: int) -> tuple[Array, Array]:
         """Return the derivative at the left and at the right end of every piece, each (K, D)."""
-        scale = (self._rate**order)[:, None]
+        scale = (self.rates**order)[:, None]
         if self.weights is None:
             c = arithmetic.differentiated(self.coefficients, order)
             return c[-1] * scale, c.sum(axis=0) * scale
@@ -284,7 +284,7 @@ class Trajectory:
         """Return the exact extrema of the derivatives of order 0 … orders-1, piece by piece."""
         from .kernels.extrema import extrema
 
-        scale = self._rate ** np.arange(orders)[:, None]
+        scale = self.rates ** np.arange(orders)[:, None]
         h, t = np.diff(self.breaks)[:, None], self.breaks[:-1, None]
         if self.weights is not None:
             bernstein = arithmetic.to_bernstein(self._homogeneous)
@@ -301,14 +301,14 @@ class Trajectory:
         """
         if self.weights is not None:
             peak = self.extrema(order + 1).peak(order) if self.duration else np.zeros(self.dims)
-            return squared_integral(self._homogeneous, self._rate, order, float((peak**2).sum()))
+            return squared_integral(self._homogeneous, self.rates, order, float((peak**2).sum()))
         if order > self.degree:
             return 0.0
         c = arithmetic.differentiated(self.coefficients, order)
         power = np.arange(len(c) - 1, -1, -1)
         gram = 1.0 / (power[:, None] + power[None, :] + 1.0)
         squares = np.einsum("kid,kl,lid->i", c, gram, c)
-        return float(np.sum(squares * self._rate ** (2 * order - 1)))
+        return float(np.sum(squares * self.rates ** (2 * order - 1)))
 
     # -- changing ----------------------------------------------------------------------------------------------------
 

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .jumps import counted_jumps
-from .limits import QUANTITIES, Boundary, DurationBounds, magnitude, segment_bounds
+from .limits import QUANTITIES, Boundary, DurationBounds, Limit, magnitude, segment_bounds
+from .quadrature import integral
 from .trajectory import Trajectory
 from .types import Certificate, Check, Demands, Followed
+from .worst import TIE, Worst, measures, peaks, worst
 
 Array = NDArray[np.float64]
 
@@ -46,7 +48,7 @@ def verify(
     at = demands.times if demands.times is not None else waypoint_times
     inner = trajectory if at is None else trajectory.split(at)
     motion = _measure(inner, demands, at)
-    checks = [row for order in range(4) if (row := _limit_row(motion, order)) is not None]
+    checks = _limit_rows(motion)
     checks += _duration_rows(trajectory, demands, at)
     waypoint_error = _waypoint_error(trajectory, demands, at, motion.span)
     boundary_error = _boundary_error(motion)
@@ -59,7 +61,7 @@ def verify(
     jerk_bounded = not motion.unbounded[3].any()
     return Certificate(
         holds=all(c.holds for c in checks) and all(e is None or e <= TOLERANCE for e in errors),
-        basis="exact",
+        basis="exact" if trajectory.weights is None else "enclosure",
         checks=tuple(checks),
         waypoint_error=waypoint_error,
         boundary_error=boundary_error,
@@ -78,16 +80,12 @@ def verify(
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """What a trajectory does, piece by piece: extrema and jumps of position, velocity, acceleration and jerk."""
+    """What a trajectory does: its peaks, and the breaks at which it jumps."""
 
     trajectory: Trajectory
     demands: Demands
     segment: NDArray[np.int64]  # (K,)
     span: float  # what errors of positions are relative to
-    low: Array  # (4, K, D)
-    high: Array
-    at_low: Array
-    at_high: Array
     peaks: Array  # (4, D)
     jumps: NDArray[np.bool_]  # (4, K - 1, D): at which breaks a lower derivative jumps, so that this one is unbounded
 
@@ -98,28 +96,16 @@ class _Motion:
 
 
 def _measure(trajectory: Trajectory, demands: Demands, at: Array | None) -> _Motion:
-    found = trajectory.extrema(4)
-    peaks = np.stack([found.peak(m) for m in range(4)])
+    highest = peaks(trajectory, 4)
     span = position_span(trajectory if demands.waypoints is None else demands.waypoints)
     jumps = np.zeros((4, trajectory.pieces - 1, trajectory.dims), dtype=bool)
     for m in range(3):
-        jumps[m + 1] = jumps[m] | counted_jumps(trajectory, m, peaks[m], span)
-    middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
-    segment = np.zeros(len(middles), dtype=np.int64)
+        jumps[m + 1] = jumps[m] | counted_jumps(trajectory, m, highest[m], span)
+    segment = np.zeros(trajectory.pieces, dtype=np.int64)
     if at is not None:
+        middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
         segment = np.clip(np.searchsorted(at, middles, side="right") - 1, 0, max(len(at) - 2, 0))
-    return _Motion(
-        trajectory,
-        demands,
-        segment,
-        span,
-        found.low,
-        found.high,
-        found.at_low,
-        found.at_high,
-        peaks,
-        jumps,
-    )
+    return _Motion(trajectory, demands, segment, span, highest, jumps)
 
 
 def position_span(points: Array | Trajectory) -> float:
@@ -133,56 +119,73 @@ def _continuity(trajectory: Trajectory, span: float) -> int | None:
     """Return the class: the highest order up to which nothing jumps; -1 if the position does; None for one piece."""
     if trajectory.pieces == 1:
         return None
-    found = trajectory.extrema(trajectory.degree + 1)
-    for order in range(trajectory.degree + 1):
-        if counted_jumps(trajectory, order, found.peak(order), span).any():
+    if trajectory.weights is None:
+        highest = list(peaks(trajectory, trajectory.degree + 1))
+    else:  # the scale of a derivative is all that counts here
+        ends = (np.abs(trajectory.ends(m)) for m in range(trajectory.degree + 1))
+        highest = [e.max(axis=(0, 1)) for e in ends]
+    for order, peak in enumerate(highest):
+        if counted_jumps(trajectory, order, peak, span).any():
             return order - 1
     return trajectory.degree
 
 
-def _limit_row(motion: _Motion, order: int) -> Check | None:
-    """Return the worst joint, segment and time of one limited quantity, or None if it is not limited."""
+def _limit_rows(motion: _Motion) -> list[Check]:
+    """Return a row for every limited quantity: the worst joint, segment and time."""
     demands = motion.demands
     segments = int(motion.segment.max()) + 1 if demands.segment_limits is None else len(demands.segment_limits)
-    limit = segment_bounds(demands.limits, demands.segment_limits, order, segments, demands.dims)
-    lower, upper = limit.lower[motion.segment], limit.upper[motion.segment]
-    bounded = np.isfinite(lower) | np.isfinite(upper)
-    if not bounded.any():
-        return None
+    if demands.segment_limits is None:
+        segments = 1
+    each = [
+        segment_bounds(demands.limits, demands.segment_limits, m, segments, demands.dims)
+        for m in range(len(QUANTITIES))
+    ]
+    limited = [bool((np.isfinite(x.lower) | np.isfinite(x.upper)).any()) for x in each]
+    if not any(limited):
+        return []
+    row = motion.segment if demands.segment_limits is not None else np.zeros_like(motion.segment)
+    lower, upper = np.stack([x.lower for x in each]), np.stack([x.upper for x in each])  # (4, S, D)
+    scale = np.stack([magnitude(x.lower, x.upper) for x in each])
+    distance, ratio = measures(lower, upper, scale), measures(lower, upper, None)
+    for by_ratio, by_distance in zip(ratio, distance, strict=True):  # for derivatives the ratio says more
+        by_ratio[:, 0] = by_distance[:, 0]
+    told = worst(motion.trajectory, *ratio, row)
+    excess = told.most - np.array([0.0, 1.0, 1.0, 1.0])[:, None]
+    if (lower[1:] != -upper[1:]).any():  # what counts is the distance over the larger side
+        excess = worst(motion.trajectory, *distance, row).most
+    return [
+        _limit_row(motion, each[m], row, m, told, bool(excess[m].max() <= TOLERANCE))
+        for m in range(len(QUANTITIES))
+        if limited[m]
+    ]
+
+
+def _limit_row(motion: _Motion, limit: Limit, row: NDArray[np.int64], order: int, found: Worst, holds: bool) -> Check:
     quantity = QUANTITIES[order]
-    infinite = motion.jumps[order] & bounded[:-1] & bounded[1:]  # between segments: where both are limited
-    if infinite.any():
-        piece, joint = (int(i) for i in np.argwhere(infinite)[0])
-        side = upper[piece, joint] if np.isfinite(upper[piece, joint]) else lower[piece, joint]
-        time, segment = float(motion.trajectory.breaks[piece + 1]), int(motion.segment[piece])
-        return Check(quantity, joint, segment, time, None, _finite(side), None, False)
-    if not (np.isfinite(motion.high[order]).all() and np.isfinite(motion.low[order]).all()):
+    if motion.jumps[order].any():
+        lower, upper = limit.lower[row], limit.upper[row]
+        bounded = np.isfinite(lower) | np.isfinite(upper)
+        infinite = motion.jumps[order] & bounded[:-1] & bounded[1:]  # between segments: where both are limited
+        if infinite.any():
+            piece, joint = (int(i) for i in np.argwhere(infinite)[0])
+            side = upper[piece, joint] if np.isfinite(upper[piece, joint]) else lower[piece, joint]
+            time, segment = float(motion.trajectory.breaks[piece + 1]), int(motion.segment[piece])
+            return Check(quantity, joint, segment, time, None, _finite(side), None, False)
+    if not np.isfinite(motion.peaks[order]).all():
         return Check(quantity, None, None, None, None, None, None, False)
-    scale = magnitude(lower, upper)
-    high, low = motion.high[order], motion.low[order]
-    excess = np.stack([(high - upper) / scale, (lower - low) / scale])
-    if order == 0:
-        badness = excess
-    else:  # the ratio says more than the distance where the sides differ
-        badness = np.stack([high / upper, low / lower])
-        badness = np.where(excess > 0, np.maximum(badness, 1.0 + excess), badness)
-    worst = float(badness.max())
-    ties = np.argwhere(badness >= worst - 1e-9 * abs(worst))  # the earliest, whatever rounding prefers
-    when = np.stack([motion.at_high, motion.at_low])[:, order]
-    which, piece, joint = (int(i) for i in ties[np.argmin(when[tuple(ties.T)])])
-    value = (high, low)[which][piece, joint]
-    bound = (upper, lower)[which][piece, joint]
-    time = when[which, piece, joint]
-    if order == 0:
-        half = 0.5 * (upper[piece, joint] - lower[piece, joint])
-        middle = 0.5 * (upper[piece, joint] + lower[piece, joint])
-        ratio = abs(value - middle) / half if np.isfinite(half) else None
-    else:
+    badness, most = found.badness[order], float(found.most[order].max())
+    ties = np.flatnonzero(badness >= most - TIE * abs(most))  # the earliest, whatever rounding prefers
+    joint = int(ties[np.argmin(found.time[order, ties])])
+    piece, value = int(found.piece[order, joint]), float(found.value[order, joint])
+    low, high = float(limit.lower[row[piece], joint]), float(limit.upper[row[piece], joint])
+    bound = low if found.side[order, joint] else high
+    ratio: float | None = None
+    if order > 0:
         ratio = value / bound
-    holds = bool(excess.max() <= TOLERANCE)
-    segment = int(motion.segment[piece])
-    ratio = None if ratio is None else float(ratio)
-    return Check(quantity, joint, segment, float(time), float(value), float(bound), ratio, holds)
+    elif np.isfinite(high - low):
+        ratio = abs(value - 0.5 * (low + high)) / (0.5 * (high - low))
+    time, segment = float(found.time[order, joint]), int(motion.segment[piece])
+    return Check(quantity, joint, segment, time, value, bound, ratio, holds)
 
 
 def _finite(value: float) -> float | None:
@@ -251,7 +254,7 @@ def _path_deviation(trajectory: Trajectory, path: Followed) -> float:
     rate = law.extrema(2)
     if -float(rate.low[1].min()) > TOLERANCE * float(rate.high[1].max()):
         return float("inf")
-    nodes = 2 * max(trajectory.degree, curve.degree * law.degree) + 3
+    nodes = 2 * max(trajectory.degree, curve.degree * law.degree) + 3  # for quotients: of both denominators
     u = 0.5 - 0.5 * np.cos(np.pi * np.arange(nodes) / (nodes - 1))
     breaks = np.union1d(trajectory.breaks, np.clip(law.breaks, trajectory.start, trajectory.end))
     times = (breaks[:-1, None] + np.diff(breaks)[:, None] * u).reshape(-1)
@@ -260,43 +263,30 @@ def _path_deviation(trajectory: Trajectory, path: Followed) -> float:
     return float(np.linalg.norm(trajectory(times) - curve(s), axis=1).max())
 
 
-#: Gauss-Legendre rules on [0, 1]: (nodes, weights), a coarse and a fine one.
-_RULES = [(0.5 + 0.5 * x, 0.5 * w) for x, w in map(np.polynomial.legendre.leggauss, (8, 16))]
-
-
-MOST_PIECES = 1 << 16
-
-
 def path_length(trajectory: Trajectory) -> float:
-    """Return the integral of the Euclidean norm of the velocity, to about 1e-10 relative.
-
-    Gauss-Legendre on each piece, halving those whose 8- and 16-point values differ (the norm has kinks at rests).
-    """
-    n = trajectory.degree
-    if n == 0:
+    """Return the integral of the Euclidean norm of the velocity, to about 1e-10 relative."""
+    if trajectory.degree == 0 or trajectory.duration == 0.0:
         return 0.0
-    slopes = trajectory.coefficients[:-1] * np.arange(n, 0, -1.0)[:, None, None]  # d/du, highest power first
-    piece, left, width = np.arange(trajectory.pieces), np.zeros(trajectory.pieces), np.ones(trajectory.pieces)
+    slopes = trajectory.coefficients[:-1] * np.arange(trajectory.degree, 0, -1.0)[:, None, None]  # d/du
     noise = 64 * np.finfo(float).eps * np.sqrt((np.abs(slopes).sum(axis=0) ** 2).sum(axis=1))
-    total = 0.0
-    for _ in range(48):
-        a, b = (_speed_integrals(slopes[:, piece], left, width, *rule) for rule in _RULES)
-        scale = max(total + float(b.sum()), 1e-300)
-        rough = np.abs(a - b) > np.maximum(1e-11 * scale / np.sqrt(len(a)), noise[piece] * width)
-        total += float(b[~rough].sum())
-        if not rough.any():
-            return total
-        if rough.sum() > MOST_PIECES:  # rounding, or kinks without end: what there is, is good enough
-            break
-        piece, half = np.repeat(piece[rough], 2), 0.5 * width[rough]
-        left = np.stack([left[rough], left[rough] + half], axis=1).reshape(-1)
-        width = np.repeat(half, 2)
-    return total + float(b[rough].sum())
+    if trajectory.weights is not None:
+        return _rational_length(trajectory, noise)
+    from .kernels.speed import speeds
+
+    def speed(piece: NDArray[np.int64], u: Array) -> Array:
+        out = np.empty_like(u)
+        speeds(slopes, piece, u, out)
+        return out
+
+    return integral(speed, trajectory.pieces, noise)
 
 
-def _speed_integrals(slopes: Array, left: Array, width: Array, nodes: Array, weights: Array) -> Array:
-    u = (left[:, None] + width[:, None] * nodes)[:, :, None]
-    value = np.broadcast_to(slopes[0][:, None, :], (len(left), len(nodes), slopes.shape[2]))
-    for c in slopes[1:]:
-        value = value * u + c[:, None, :]
-    return np.asarray(width * (np.sqrt(np.einsum("knd,knd->kn", value, value)) @ weights))
+def _rational_length(trajectory: Trajectory, noise: Array) -> float:
+    h = np.diff(trajectory.breaks)
+
+    def speed(piece: NDArray[np.int64], u: Array) -> Array:
+        times = trajectory.breaks[piece, None] + u * h[piece, None]
+        rate = trajectory(np.clip(times, trajectory.start, trajectory.end), 1)
+        return np.asarray(np.linalg.norm(rate, axis=-1) * h[piece, None])
+
+    return integral(speed, trajectory.pieces, noise)

@@ -1,11 +1,243 @@
-"""Evaluation of a piecewise polynomial and its derivatives at many times, in one pass.
+"""Evaluation of a piecewise polynomial and its derivatives at many times, in one pass over the output.
 
-The piece is found by marching where times increase and by bisection where they do not; its coefficients, with those of
-the derivatives asked for, are gathered once per visit.
+Eight joints are computed at once, in a vector register: a block of eight is read straight from the coefficients and
+written straight to the output. Where D is no multiple of eight, the last block reads and writes past the joints, which
+does no harm: what it writes there belongs to the next time, which comes later and overwrites it. Only where that would
+leave the arrays do blocks take a detour over small padded ones. LLVM's own vectorisers give up on these loops (they are
+short, and nothing tells that input and output do not overlap); hence the vector type with its few operations below.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
-from numba import njit
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba import njit, types
+from numba.extending import intrinsic, models, register_model
+
+LANES = 8
+
+_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+_FUSED = ("contract",)  # a product and a sum may become one instruction
+
+
+class _Lanes(types.Type):  # type: ignore[misc]
+    """The Numba type of LANES numbers in a vector register."""
+
+    def __init__(self) -> None:
+        super().__init__("Lanes")
+
+
+@register_model(_Lanes)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    """The LLVM type behind it."""
+
+    def __init__(self, manager: Any, numba_type: Any) -> None:
+        super().__init__(manager, numba_type, _VECTOR)
+
+
+lanes = _Lanes()
+
+
+def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
+    data = context.make_array(array_type)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [index]), _VECTOR.as_pointer())
+
+
+def _everywhere(builder: Any, x: Any) -> Any:
+    indices, empty = ir.VectorType(ir.IntType(32), LANES), ir.Constant(_VECTOR, ir.Undefined)
+    first = builder.insert_element(empty, x, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, empty, ir.Constant(indices, [0] * LANES))
+
+
+@intrinsic
+def load(typing: Any, array: Any, index: Any) -> Any:
+    """Return array[index : index + LANES], without checks."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        value = builder.load(_pointer(context, builder, signature.args[0], *args))
+        value.align = 8
+        return value
+
+    return lanes(array, types.intp), generate
+
+
+@intrinsic
+def store(typing: Any, array: Any, index: Any, x: Any) -> Any:
+    """Let array[index : index + LANES] be x, without checks."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        builder.store(args[2], _pointer(context, builder, signature.args[0], *args[:2])).align = 8
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, lanes), generate
+
+
+def _operation(build: Callable[..., Any], *extra: Any) -> Any:
+    """Return the generator of an operation on lanes and, in ``extra``, numbers or further lanes."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return build(builder, *(_everywhere(builder, x) if x.type == ir.DoubleType() else x for x in args))
+
+    return lanes(lanes, *extra), generate
+
+
+@intrinsic
+def scaled(typing: Any, x: Any, factor: Any) -> Any:
+    """Return x * factor."""
+    return _operation(lambda builder, x, factor: builder.fmul(x, factor), types.float64)
+
+
+@intrinsic
+def plus(typing: Any, x: Any, y: Any) -> Any:
+    """Return x + y."""
+    return _operation(lambda builder, x, y: builder.fadd(x, y), lanes)
+
+
+@intrinsic
+def product(typing: Any, x: Any, y: Any) -> Any:
+    """Return x * y."""
+    return _operation(lambda builder, x, y: builder.fmul(x, y), lanes)
+
+
+@intrinsic
+def step(typing: Any, x: Any, u: Any, y: Any) -> Any:
+    """Return x * u + y, rounded once where the machine can."""
+
+    def build(builder: Any, x: Any, u: Any, y: Any) -> Any:
+        return builder.fadd(builder.fmul(x, u, flags=_FUSED), y, flags=_FUSED)
+
+    return _operation(build, types.float64, lanes)
+
+
+@intrinsic
+def larger(typing: Any, x: Any, y: Any) -> Any:
+    """Return the larger of x and y; y where either is not a number."""
+    return _operation(lambda builder, x, y: builder.select(builder.fcmp_ordered(">", x, y), x, y), lanes)
+
+
+@intrinsic
+def smaller(typing: Any, x: Any, y: Any) -> Any:
+    """Return the smaller of x and y; y where either is not a number."""
+    return _operation(lambda builder, x, y: builder.select(builder.fcmp_ordered("<", x, y), x, y), lanes)
+
+
+@intrinsic
+def exceeds(typing: Any, x: Any, y: Any) -> Any:
+    """Return whether any of x is larger than its y, or no number."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        bits = builder.bitcast(builder.fcmp_unordered(">", *args), ir.IntType(LANES))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(LANES), 0))
+
+    return types.boolean(lanes, lanes), generate
+
+
+@njit(cache=True, error_model="numpy")
+def _taylor(c, at, row, size, u):  # type: ignore[no-untyped-def]
+    """Return p(u), p'(u), p''(u) / 2, p'''(u) / 6 by repeated division; the coefficients are c[at + k * row]."""
+    p0 = load(c, at)
+    p1 = p2 = p3 = scaled(p0, 0.0)
+    for k in range(1, size):
+        at += row
+        # a level is started, not stepped, by its first coefficient: 14 products instead of 20 for quintics
+        p3 = step(p3, u, p2) if k > 3 else p2 if k == 3 else p3
+        p2 = step(p2, u, p1) if k > 2 else p1 if k == 2 else p2
+        p1 = step(p1, u, p0) if k > 1 else p0
+        p0 = step(p0, u, load(c, at))
+    return p0, p1, p2, p3
+
+
+@njit(cache=True, error_model="numpy")
+def _value(c, at, row, size, u):  # type: ignore[no-untyped-def]
+    """Return p(u)."""
+    p = load(c, at)
+    for _ in range(1, size):
+        at += row
+        p = step(p, u, load(c, at))
+    return p
+
+
+@njit(cache=True, error_model="numpy")
+def _piece(breaks, i, t):  # type: ignore[no-untyped-def]
+    """Return the piece of time t: one of the next few after piece i, or else found by bisection."""
+    low, count = 0, i
+    if t >= breaks[i]:
+        last = min(i + 4, len(breaks) - 2)
+        while i < last:
+            if t < breaks[i + 1]:
+                return i
+            i += 1
+        low, count = i, len(breaks) - 1 - i
+    while count > 1:
+        half = count >> 1
+        low = low + half if t >= breaks[low + half] else low  # a conditional move: a branch would be guessed wrong
+        count -= half
+    return low
+
+
+@njit(cache=True, error_model="numpy")
+def _run(c, start, row, size, times, begin, end, origin, rate, scales, orders, out, to, plane, dims):  # type: ignore[no-untyped-def]
+    """Write what the times begin … end - 1 have on one piece, whose coefficients are c[start + k * row + d]."""
+    s0, s1, s2, s3 = scales
+    for k in range(begin, end):
+        u = (times[k] - origin) * rate
+        u = 0.0 if u < 0.0 else 1.0 if u > 1.0 else u
+        for d in range(0, dims, LANES):
+            at = to + k * dims + d
+            if orders == 1:
+                store(out, at, scaled(_value(c, start + d, row, size, u), s0))
+                continue
+            if size == 6:
+                p0, p1, p2, p3 = _taylor(c, start + d, row, 6, u)
+            else:
+                p0, p1, p2, p3 = _taylor(c, start + d, row, size, u)
+            store(out, at, scaled(p0, s0))
+            store(out, at + plane, scaled(p1, s1))
+            if orders > 2:
+                store(out, at + 2 * plane, scaled(p2, s2))
+            if orders > 3:
+                store(out, at + 3 * plane, scaled(p3, s3))
+
+
+@njit(cache=True, error_model="numpy")
+def _march(breaks, coefficients, times, begin, end, order, orders, out, to, plane):  # type: ignore[no-untyped-def]
+    """Write the derivatives of order ``order`` … ``order + orders - 1`` (at most four) at the times begin … end - 1.
+
+    That of order ``order + r`` at time k is written to out[to + r * plane + k * D + d], and rubbish past it.
+    """
+    pieces, dims = coefficients.shape[1:]
+    size = len(coefficients) - order
+    wide = (dims + LANES - 1) // LANES * LANES
+    c = coefficients.reshape(-1)
+    own = np.zeros(size * wide)  # the piece's coefficients where they cannot be read in place
+    i = 0
+    while begin < end:
+        i = _piece(breaks, i, times[begin])
+        origin, right = breaks[i], breaks[i + 1]
+        rate = 1.0 / (right - origin) if right > origin else 0.0
+        left = origin if i > 0 else -np.inf
+        right = right if i < pieces - 1 else np.inf
+        stop = begin + 1
+        while stop < end and left <= times[stop] < right:
+            stop += 1
+        s0 = rate**order if order > 0 else 1.0
+        s1 = s0 * rate if size > 1 else 0.0  # zero, as infinity times zero would not be
+        s2 = s1 * rate * 2.0 if size > 2 else 0.0
+        s3 = s2 * rate * 3.0 if size > 3 else 0.0
+        scales = (s0, s1, s2, s3)
+        if order == 0 and i * dims + wide <= pieces * dims:
+            row = pieces * dims
+            _run(c, i * dims, row, size, times, begin, stop, origin, rate, scales, orders, out, to, plane, dims)
+        else:
+            for p in range(size):
+                factor = 1.0
+                for q in range(order):
+                    factor *= size - 1 - p + order - q
+                for d in range(dims):
+                    own[p * wide + d] = coefficients[p, i, d] * factor
+            _run(own, np.int64(0), wide, size, times, begin, stop, origin, rate, scales, orders, out, to, plane, dims)
+        begin = stop
 
 
 @njit(cache=True, error_model="numpy")
@@ -23,49 +255,20 @@ def evaluate(breaks, coefficients, times, first, out):  # type: ignore[no-untype
     out : array (R, M, D)
         Overwritten.
     """
-    size, pieces, dims = coefficients.shape
-    n = size - 1
-    orders, count, _ = out.shape
-    local = np.zeros((orders, size, dims))  # the derivatives of the current piece, highest power first
-    current = -1
-    left = rate = 0.0
-    for k in range(count):
-        t = times[k]
-        i = max(current, 0)
-        if t < breaks[i]:
-            i = 0
-        if i + 8 < pieces and t >= breaks[i + 8]:
-            low, high = i, pieces
-            while high - low > 1:
-                middle = (low + high) // 2
-                if t >= breaks[middle]:
-                    low = middle
-                else:
-                    high = middle
-            i = low
-        while i + 1 < pieces and t >= breaks[i + 1]:
-            i += 1
-        if i != current:
-            current, left = i, breaks[i]
-            width = breaks[i + 1] - left
-            rate = 1.0 / width if width > 0.0 else 0.0
-            scale = 1.0
-            for _ in range(first):
-                scale *= rate
-            for r in range(orders):
-                m = first + r
-                for p in range(n, m - 1, -1):
-                    factor = scale
-                    for q in range(m):
-                        factor *= p - q
-                    for d in range(dims):
-                        local[r, n - p, d] = coefficients[n - p, i, d] * factor
-                scale *= rate
-        u = min(max((t - left) * rate, 0.0), 1.0)
-        for r in range(orders):
-            degree = n - first - r
-            for d in range(dims):
-                value = local[r, 0, d] if degree >= 0 else 0.0
-                for p in range(1, degree + 1):
-                    value = value * u + local[r, p, d]
-                out[r, k, d] = value
+    orders, count, dims = out.shape
+    plane = count * dims
+    tail = min(count, (LANES + dims - 1) // dims)  # the last times, of which a block could leave the plane
+    room = tail * dims + LANES  # in the spare planes, where the tail is put first
+    flat, spare = out.reshape(-1), np.empty(4 * room)
+    for r in range(0, orders, 4):
+        if first + r >= len(coefficients):
+            out[r:] = 0.0
+            break
+        part = min(orders - r, 4)
+        target, to, gap, end = flat, r * plane, plane, count - tail
+        for last in range(2):
+            _march(breaks, coefficients, times, last * end, end + last * tail, first + r, part, target, to, gap)
+            target, to, gap = spare, -end * dims, room
+        for j in range(part):
+            for d in range(tail * dims):
+                flat[(r + j + 1) * plane - tail * dims + d] = spare[j * room + d]

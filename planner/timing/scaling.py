@@ -10,6 +10,7 @@ from ..jumps import counted_jumps
 from ..limits import QUANTITIES, DurationBounds, Limits, magnitude, segment_bounds
 from ..trajectory import Trajectory
 from ..types import PlanRequest
+from ..worst import measures, peaks, worst
 
 Array = NDArray[np.float64]
 
@@ -38,13 +39,15 @@ def slowdown(trajectory: Trajectory, request: PlanRequest, waypoint_times: Array
     trajectory = trajectory.split(waypoint_times)
     middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
     segment = np.clip(np.searchsorted(waypoint_times, middles, side="right") - 1, 0, request.count - 2)
-    found = trajectory.extrema(4)
+    each = [
+        segment_bounds(request.limits, request.segment_limits, m, request.count - 1, request.dims) for m in range(4)
+    ]
+    ratios = worst(trajectory, *measures(np.stack([x.lower for x in each]), np.stack([x.upper for x in each])), segment)
+    highest = peaks(trajectory, 3)
     best, jumping = Slowdown(0.0, None), np.zeros(trajectory.dims, dtype=bool)
     for order in (1, 2, 3):
-        lower_order = order - 1
-        jumps = counted_jumps(trajectory, lower_order, found.peak(lower_order), 1.0)
-        jumping = jumping | jumps.any(axis=0)
-        limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
+        lower_order, limit = order - 1, each[order]
+        jumping = jumping | counted_jumps(trajectory, lower_order, highest[lower_order]).any(axis=0)
         bounded = (np.isfinite(limit.lower) | np.isfinite(limit.upper)).any(axis=0)
         if (jumping & bounded).any():
             joint = int(np.argmax(jumping & bounded))
@@ -56,8 +59,7 @@ def slowdown(trajectory: Trajectory, request: PlanRequest, waypoint_times: Array
                 bound=float(magnitude(limit.lower, limit.upper)[0, joint]),
                 certified=True,
             )
-        ratio = np.maximum(found.high[order] / limit.upper[segment], found.low[order] / limit.lower[segment]).max()
-        factor = float(max(ratio, 0.0)) ** (1.0 / order)
+        factor = max(float(ratios.most[order].max()), 0.0) ** (1.0 / order)
         if factor > best.factor:
             best = Slowdown(factor, QUANTITIES[order])
     return Slowdown(best.factor * (1.0 + STRICT), best.binding)
