@@ -226,7 +226,7 @@ def build_path(option: PathOption, points: Array, boundary: str = "natural", kno
     at = curves.knots(points, option.spacing) if knots is None else knots
     if isinstance(option, CubicSplinePath):
         return Path(_moved_errors(lambda: curves.cubic_spline(at, points, option.boundary or boundary)), at)
-    return Path(_moved_errors(lambda: _THROUGH[type(option)](option, at, points)), at)
+    return Path(_moved_errors(lambda: _THROUGH[type(option)](option, at, points)).split(at), at)
 
 
 #: The curves through waypoints: of the option, the parameter values and the points.
@@ -306,7 +306,7 @@ def _given(option: GivenPath, points: Array, knots: Array | None) -> Path:
     if miss.max() > 1e-6 * max(1.0, float(np.ptp(points, axis=0).max())):
         i = int(np.argmax(miss))
         raise InvalidRequest.of(f"/waypoints/{i}", "conflict", f"the path misses it by {miss[i]:g}")
-    return Path(curve, knots)
+    return Path(curve.split(knots), knots)
 
 
 def refuse_position_limits(path: Path, request: PlanRequest) -> None:

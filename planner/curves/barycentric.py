@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 #: More nodes than this need a small Lebesgue constant; no nodes may have a larger one than the last.
 MOST_NODES, SMALL, LARGEST = 50, 1e4, 1e13
+#: By how much rounding may keep it from a point, relative to max(1, their range).
+MISSED = 1e-7
 #: More would take long, and tell nothing that a spline does not.
 MOST_DEGREE = 400
 
@@ -137,7 +139,9 @@ def polynomial(times: ArrayLike, points: ArrayLike, start: float | None = None, 
     t, x = np.asarray(times, dtype=np.float64), np.asarray(points, dtype=np.float64)
     start, end = float(t[0]) if start is None else start, float(t[-1]) if end is None else end
     refuse_ill_conditioned(t, start, end, "cubic_spline", "polynomial with nodes chebyshev")
-    return newton_trajectory(t, x, None, start, end)
+    curve = newton_trajectory(t, x, None, start, end)
+    refuse_missed(curve, t, x, "cubic_spline")
+    return curve
 
 
 def refuse_ill_conditioned(nodes: Array, start: float, end: float, *instead: str, twice: bool = False) -> None:
@@ -155,3 +159,11 @@ def refuse_ill_conditioned(nodes: Array, start: float, end: float, *instead: str
     if condition > (SMALL if count > MOST_NODES else LARGEST):
         reason = f"one polynomial of degree {count - 1} through these nodes has the condition number {condition:.3g} "
         raise InvalidRequest.of("/waypoints", "bad_degree", f"{reason}(Lebesgue constant): use {others}")
+
+
+def refuse_missed(curve: Trajectory, nodes: Array, points: Array, instead: str) -> None:
+    """Raise ``bad_degree`` where rounding keeps the polynomial from the points it should pass."""
+    miss = float(np.abs(curve(np.clip(nodes, curve.start, curve.end)) - points).max())
+    if not miss <= MISSED * max(1.0, float(np.ptp(points, axis=0).max())):
+        reason = f"one polynomial through these points is lost to rounding (it misses one by {miss:.3g}): use {instead}"
+        raise InvalidRequest.of("/waypoints", "bad_degree", reason)

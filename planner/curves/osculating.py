@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from ..trajectory import Trajectory
-from .barycentric import refuse_ill_conditioned
+from .barycentric import refuse_ill_conditioned, refuse_missed
 from .local_hermite import tangents
 from .newton import newton_trajectory
 from .options import Matrix, Spaced, rows_of
@@ -45,7 +45,9 @@ def hermite(times: ArrayLike, points: ArrayLike, velocities: ArrayLike) -> Traje
     """
     t, x = np.asarray(times, dtype=np.float64), np.asarray(points, dtype=np.float64)
     refuse_ill_conditioned(t, float(t[0]), float(t[-1]), "cubic_hermite", twice=True)
-    return newton_trajectory(t, x, np.asarray(velocities, dtype=np.float64), float(t[0]), float(t[-1]))
+    curve = newton_trajectory(t, x, np.asarray(velocities, dtype=np.float64), float(t[0]), float(t[-1]))
+    refuse_missed(curve, t, x, "cubic_hermite")
+    return curve
 
 
 def from_options(options: HermiteOptions, times: Array, points: Array) -> Trajectory:

@@ -3,134 +3,13 @@
 Eight joints are computed at once, in a vector register: a block of eight is read straight from the coefficients and
 written straight to the output. Where D is no multiple of eight, the last block reads and writes past the joints, which
 does no harm: what it writes there belongs to the next time, which comes later and overwrites it. Only where that would
-leave the arrays do blocks take a detour over small padded ones. LLVM's own vectorisers give up on these loops (they are
-short, and nothing tells that input and output do not overlap); hence the vector type with its few operations below.
+leave the arrays do blocks take a detour over small padded ones.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-from llvmlite import ir  # type: ignore[import-untyped]
-from numba import njit, types
-from numba.extending import intrinsic, models, register_model
+from numba import njit
 
-LANES = 8
-
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
-_FUSED = ("contract",)  # a product and a sum may become one instruction
-
-
-class _Lanes(types.Type):  # type: ignore[misc]
-    """The Numba type of LANES numbers in a vector register."""
-
-    def __init__(self) -> None:
-        super().__init__("Lanes")
-
-
-@register_model(_Lanes)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
-    """The LLVM type behind it."""
-
-    def __init__(self, manager: Any, numba_type: Any) -> None:
-        super().__init__(manager, numba_type, _VECTOR)
-
-
-lanes = _Lanes()
-
-
-def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
-    data = context.make_array(array_type)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [index]), _VECTOR.as_pointer())
-
-
-def _everywhere(builder: Any, x: Any) -> Any:
-    indices, empty = ir.VectorType(ir.IntType(32), LANES), ir.Constant(_VECTOR, ir.Undefined)
-    first = builder.insert_element(empty, x, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(first, empty, ir.Constant(indices, [0] * LANES))
-
-
-@intrinsic
-def load(typing: Any, array: Any, index: Any) -> Any:
-    """Return array[index : index + LANES], without checks."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        value = builder.load(_pointer(context, builder, signature.args[0], *args))
-        value.align = 8
-        return value
-
-    return lanes(array, types.intp), generate
-
-
-@intrinsic
-def store(typing: Any, array: Any, index: Any, x: Any) -> Any:
-    """Let array[index : index + LANES] be x, without checks."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        builder.store(args[2], _pointer(context, builder, signature.args[0], *args[:2])).align = 8
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp, lanes), generate
-
-
-def _operation(build: Callable[..., Any], *extra: Any) -> Any:
-    """Return the generator of an operation on lanes and, in ``extra``, numbers or further lanes."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return build(builder, *(_everywhere(builder, x) if x.type == ir.DoubleType() else x for x in args))
-
-    return lanes(lanes, *extra), generate
-
-
-@intrinsic
-def scaled(typing: Any, x: Any, factor: Any) -> Any:
-    """Return x * factor."""
-    return _operation(lambda builder, x, factor: builder.fmul(x, factor), types.float64)
-
-
-@intrinsic
-def plus(typing: Any, x: Any, y: Any) -> Any:
-    """Return x + y."""
-    return _operation(lambda builder, x, y: builder.fadd(x, y), lanes)
-
-
-@intrinsic
-def product(typing: Any, x: Any, y: Any) -> Any:
-    """Return x * y."""
-    return _operation(lambda builder, x, y: builder.fmul(x, y), lanes)
-
-
-@intrinsic
-def step(typing: Any, x: Any, u: Any, y: Any) -> Any:
-    """Return x * u + y, rounded once where the machine can."""
-
-    def build(builder: Any, x: Any, u: Any, y: Any) -> Any:
-        return builder.fadd(builder.fmul(x, u, flags=_FUSED), y, flags=_FUSED)
-
-    return _operation(build, types.float64, lanes)
-
-
-@intrinsic
-def larger(typing: Any, x: Any, y: Any) -> Any:
-    """Return the larger of x and y; y where either is not a number."""
-    return _operation(lambda builder, x, y: builder.select(builder.fcmp_ordered(">", x, y), x, y), lanes)
-
-
-@intrinsic
-def smaller(typing: Any, x: Any, y: Any) -> Any:
-    """Return the smaller of x and y; y where either is not a number."""
-    return _operation(lambda builder, x, y: builder.select(builder.fcmp_ordered("<", x, y), x, y), lanes)
-
-
-@intrinsic
-def exceeds(typing: Any, x: Any, y: Any) -> Any:
-    """Return whether any of x is larger than its y, or no number."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        bits = builder.bitcast(builder.fcmp_unordered(">", *args), ir.IntType(LANES))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(LANES), 0))
-
-    return types.boolean(lanes, lanes), generate
+from .lanes import LANES, load, scaled, step, store
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,8 +7,8 @@ eight polynomials at once; a piece whose hull stays below the worst found so far
 import numpy as np
 from numba import njit
 
-from .evaluation import LANES, exceeds, larger, load, plus, product, scaled, smaller, step, store
 from .extrema import EPS, chain, quintic
+from .lanes import LANES, exceeds, larger, load, plus, product, scaled, smaller, step, store
 
 #: Places this close to the maximum, relatively, are equally bad: the first of them is told.
 TIE = 1e-9
@@ -68,9 +68,9 @@ def _screen(  # type: ignore[no-untyped-def]
 ):
     """Return the first of ``begin``, ``begin + LANES``, … from which on one of the next eight polynomials stands out.
 
-    The coefficient of u^k of polynomial f is c[start + f - k * row] * weights[0][k] * rates[f] ** order; it stands out where
-    gains[0, f] times its upper bound exceeds limits[0, f] or gains[1, f] times its lower bound limits[1, f]. These
-    products are left in ``reach``. The bounds allow for rounding, here and in ``extrema``.
+    The coefficient of u^k of polynomial f is c[start + f - k * row] * weights[0][k] * rates[f] ** order; f stands out
+    where gains[0, f] times its upper bound exceeds limits[0, f] or gains[1, f] times its lower bound limits[1, f].
+    These products are left in ``reach``. The bounds allow for rounding, here and in ``extrema``.
     """
     plain, own = weights
     high_gain, low_gain, high_limit, low_limit = gains[0], gains[1], limits[0], limits[1]
