@@ -53,6 +53,32 @@ CASES: dict[str, Case] = {
             {"waypoints": PICK_AND_PLACE, "times": [0.0, 0.6, 1.1, 1.5, 2.3, 3.1, 3.6, 4.6]},
         ),
         Case(
+            "ur5e_quintic",
+            "UR5e pick and place at given times by the quintic spline, continuous to the fourth derivative",
+            {
+                "waypoints": PICK_AND_PLACE,
+                "times": [0.0, 0.6, 1.1, 1.5, 2.3, 3.1, 3.6, 4.6],
+                "method": "quintic_spline",
+            },
+        ),
+        Case(
+            "circle",
+            "A circle as a rational curve by its control points, exactly, under velocity and acceleration limits",
+            {
+                "waypoints": [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]],
+                "method": "toppra",
+                "options": {
+                    "path": {
+                        "kind": "nurbs",
+                        "degree": 2,
+                        "knots": [0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1],
+                        "weights": [1, 0.5**0.5, 1, 0.5**0.5, 1, 0.5**0.5, 1, 0.5**0.5, 1],
+                    }
+                },
+                "limits": {"velocity": 1.0, "acceleration": 4.0},
+            },
+        ),
+        Case(
             "ur5e_acceleration",
             "UR5e pick and place under velocity and acceleration limits",
             {

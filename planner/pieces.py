@@ -8,11 +8,24 @@ from functools import cache
 from math import comb, factorial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidRequest
 
 Array = NDArray[np.float64]
+
+
+def owned(values: ArrayLike) -> Array:
+    """Return a copy that nobody else can change; an array that owns its numbers and is read-only needs none."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and values.flags.c_contiguous:
+        if values.flags.owndata and not values.flags.writeable:
+            return values
+    return np.array(values, dtype=np.float64, order="C")
+
+
+def finite(values: Array) -> bool:
+    """Return whether all are finite; their sum costs no memory, but may overflow."""
+    return bool(np.isfinite(values.sum()) or np.isfinite(values).all())
 
 
 def differentiated(c: Array, order: int) -> Array:

@@ -17,7 +17,7 @@ from .options import Options, read_options
 from .timing.stops import segment_durations
 from .trajectory import Trajectory
 from .types import Certificate, Note, PlanRequest, Solution, Stats
-from .verify import verify
+from .verify import TOLERANCE, position_span, verify
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
     name = row.objective
     judged = replace(certificate, objective=objective(name, certificate, solution.trajectory.duration, solution.bound))
     if not certificate.holds:
-        if (reason := beyond_precision(solution.trajectory, request.waypoints)) is not None:
+        if (reason := beyond_precision(solution.trajectory, asked.request.waypoints)) is not None:
             raise Unsupported(row.id, "precision", reason=reason)
         raise NotVerified(row.id, asdict(judged))
     done = time.perf_counter()
@@ -132,13 +132,15 @@ def pick(request: PlanRequest, method: str) -> tuple[Method, str | None]:
 
 def beyond_precision(trajectory: Trajectory, waypoints: Array) -> str | None:
     """Return why double precision cannot hold such a motion, or None: that is then no excuse."""
-    span = max(1.0, float(np.ptp(waypoints, axis=0).max()), float(np.abs(waypoints).max()))
+    extent = position_span(waypoints)
+    span = max(extent, float(np.abs(waypoints).max()))
     shortest, latest = float(np.diff(trajectory.breaks).min()), float(np.abs(trajectory.breaks).max())
     if np.finfo(float).eps * latest > 1e-9 * shortest:
         return f"a phase of {shortest:.3g} s at {latest:.3g} s on the clock is beyond double precision: rescale"
     largest = float(np.abs(trajectory.coefficients).max())
-    if largest > 1e8 * span:
-        return f"the curve leaves the waypoints' range by a factor of {largest / span:.3g}, beyond double precision"
+    swing = float(np.abs(trajectory.coefficients[:-1]).max(initial=0.0))
+    if largest > 1e8 * span or 64 * np.finfo(float).eps * swing > TOLERANCE * extent:
+        return f"the curve leaves the waypoints' range by a factor of {swing / extent:.3g}, beyond double precision"
     return None
 
 

@@ -64,11 +64,10 @@ class Trajectory:
     weights: Array | None = None
 
     def __post_init__(self) -> None:
-        breaks = np.array(self.breaks, dtype=np.float64)
-        coefficients = np.array(self.coefficients, dtype=np.float64, order="C")
+        breaks, coefficients = arithmetic.owned(self.breaks), arithmetic.owned(self.coefficients)
         if breaks.ndim != 1 or coefficients.ndim != 3 or coefficients.shape[1] != len(breaks) - 1 or len(breaks) < 2:
             raise InvalidRequest.of("", "shape_mismatch", "expected K + 1 breaks and coefficients (n + 1, K, D)")
-        if not (np.isfinite(breaks).all() and np.isfinite(coefficients).all()):
+        if not (arithmetic.finite(breaks) and arithmetic.finite(coefficients)):
             raise InvalidRequest.of("", "not_finite", "a trajectory's breaks and coefficients must be finite")
         still = len(breaks) == 2 and breaks[0] == breaks[1] and len(coefficients) == 1
         if not still and not (np.diff(breaks) > SHORTEST).all():
@@ -76,7 +75,7 @@ class Trajectory:
                 "", "not_increasing", f"a trajectory's breaks must increase, by {SHORTEST:g} or more"
             )
         if self.weights is not None:
-            weights = np.array(self.weights, dtype=np.float64, order="C")
+            weights = arithmetic.owned(self.weights)
             if weights.shape != coefficients.shape[:2]:
                 raise InvalidRequest.of("", "shape_mismatch", "expected weights (n + 1, K), as the coefficients")
             if not (np.isfinite(weights).all() and positive(arithmetic.to_bernstein(weights))):
@@ -101,25 +100,21 @@ class Trajectory:
 
         ``weights[k, i]`` are those of the denominator, if there is one.
         """
-        breaks = np.asarray(breaks, dtype=np.float64)
-        powers = np.asarray(powers, dtype=np.float64)
+        breaks, powers = np.asarray(breaks, dtype=np.float64), np.asarray(powers, dtype=np.float64)
         if powers.ndim != 3 or powers.shape[1] != len(breaks) - 1:
             raise InvalidRequest.of("", "shape_mismatch", "coefficients must be indexed [power][piece][joint]")
         scale = np.diff(breaks) ** np.arange(len(powers))[:, None]
         scaled = np.asarray(powers * scale[:, :, None], dtype=np.float64)[::-1]
-        if weights is None:
-            return cls(breaks, scaled)
-        below = np.asarray(weights, dtype=np.float64)
-        if below.shape != powers.shape[:2]:
-            raise InvalidRequest.of("", "shape_mismatch", "weights must be indexed [power][piece], as the coefficients")
-        return cls(breaks, scaled, (below * scale)[::-1])
+        below = None if weights is None else np.asarray(weights, dtype=np.float64)
+        if below is not None and below.shape == scale.shape:  # other shapes are refused with the rest
+            below = (below * scale)[::-1]
+        return cls(breaks, scaled, below)
 
     @classmethod
     def from_bernstein(cls, breaks: ArrayLike, points: ArrayLike) -> "Trajectory":
         """Return the trajectory whose pieces have the Bézier control points ``points[k, i, d]``, (n + 1, K, D)."""
-        return cls(
-            np.asarray(breaks, dtype=np.float64), arithmetic.from_bernstein(np.asarray(points, dtype=np.float64))
-        )
+        control = np.asarray(points, dtype=np.float64)
+        return cls(np.asarray(breaks, dtype=np.float64), arithmetic.from_bernstein(control))
 
     @classmethod
     def from_hermite(cls, breaks: ArrayLike, *derivatives: ArrayLike) -> "Trajectory":
@@ -128,13 +123,18 @@ class Trajectory:
         Position alone gives lines, with velocity cubics, with acceleration quintics, with jerk septics; neighbours
         share the values, so the result is of class C0, C1, C2, C3.
         """
-        from .kernels.splines import hermite_pieces
-
-        breaks = np.asarray(breaks, dtype=np.float64)
         at = [np.ascontiguousarray(x, dtype=np.float64) for x in derivatives]
         states = np.stack(at[1:]) if len(at) > 1 else np.empty((0, *at[0].shape))
-        out = np.empty((2 * len(at), len(breaks) - 1, at[0].shape[1]))
-        hermite_pieces(np.diff(breaks), at[0], states, out)
+        return cls.from_states(np.asarray(breaks, dtype=np.float64), at[0], states)
+
+    @classmethod
+    def from_states(cls, breaks: Array, points: Array, states: Array) -> "Trajectory":
+        """Return the same from points (N, D) and the derivatives in one array (k - 1, N, D), C-contiguous."""
+        from .kernels.splines import hermite_pieces
+
+        out = np.empty((2 * len(states) + 2, len(breaks) - 1, points.shape[1]))
+        hermite_pieces(np.diff(breaks), points, states, out)
+        out.setflags(write=False)
         return cls(breaks, out)
 
     @classmethod
@@ -192,6 +192,11 @@ class Trajectory:
             below[-1] = 1.0
         return np.concatenate([self.coefficients, below[:, :, None]], axis=2)
 
+    @cached_property
+    def rational(self) -> bool:
+        """Whether there is a denominator other than 1."""
+        return self.weights is not None and bool((self.weights[:-1] != 0.0).any() or (self.weights[-1] != 1.0).any())
+
     @property
     def _whole(self) -> Array:
         return self.coefficients if self.weights is None else self._homogeneous
@@ -203,9 +208,8 @@ class Trajectory:
 
     def weight_powers(self) -> Array | None:
         """Return ``[k, i]`` = the denominator's coefficient of (t - breaks[i])^k, or None."""
-        if self.weights is None:
-            return None
-        return np.asarray(self.weights[::-1] * self.rates ** np.arange(self.degree + 1)[:, None])
+        scale = self.rates ** np.arange(self.degree + 1)[:, None]
+        return None if self.weights is None else np.asarray(self.weights[::-1] * scale)
 
     # -- evaluation --------------------------------------------------------------------------------------------------
 
@@ -240,7 +244,7 @@ class Trajectory:
         if out is not None and (out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous):
             raise ValueError(f"out must be a C-contiguous array of float64 of shape {shape}")
         flat = np.ascontiguousarray(t).reshape(-1)
-        if self.weights is None:
+        if not self.rational:
             out = np.empty(shape) if out is None else out
             evaluate(self.breaks, self.coefficients, flat, first, out)
             return out.reshape(orders, *t.shape, self.dims)
@@ -267,7 +271,7 @@ class Trajectory:
     def ends(self, order: int) -> tuple[Array, Array]:
         """Return the derivative at the left and at the right end of every piece, each (K, D)."""
         scale = (self.rates**order)[:, None]
-        if self.weights is None:
+        if not self.rational:
             c = arithmetic.differentiated(self.coefficients, order)
             return c[-1] * scale, c.sum(axis=0) * scale
         found = [arithmetic.differentiated(self._homogeneous, m) for m in range(order + 1)]
@@ -286,7 +290,7 @@ class Trajectory:
 
         scale = self.rates ** np.arange(orders)[:, None]
         h, t = np.diff(self.breaks)[:, None], self.breaks[:-1, None]
-        if self.weights is not None:
+        if self.rational:
             bernstein = arithmetic.to_bernstein(self._homogeneous)
             low, at_low, high, at_high = enclosures(bernstein[..., :-1], bernstein[..., -1], scale)
         else:
@@ -299,7 +303,7 @@ class Trajectory:
 
         For rational pieces: by quadrature, to about 1e-10.
         """
-        if self.weights is not None:
+        if self.rational:
             peak = self.extrema(order + 1).peak(order) if self.duration else np.zeros(self.dims)
             return squared_integral(self._homogeneous, self.rates, order, float((peak**2).sum()))
         if order > self.degree:
@@ -334,11 +338,7 @@ class Trajectory:
         if a.ndim != 2 or a.shape[1] != self.dims:
             raise InvalidRequest.of("matrix", "shape_mismatch", f"expected E rows of {self.dims} entries")
         image = np.asarray(self.coefficients @ a.T)
-        b = np.broadcast_to(np.asarray(offset, dtype=np.float64), (len(a),))
-        if self.weights is None:
-            image[-1] += b
-        else:
-            image += self.weights[:, :, None] * b
+        image += self._homogeneous[:, :, -1:] * np.broadcast_to(np.asarray(offset, dtype=np.float64), (len(a),))
         return replace(self, coefficients=image)
 
     def joints(self, chosen: Sequence[int]) -> "Trajectory":
@@ -391,7 +391,7 @@ class Trajectory:
             ``not_increasing`` where the law falls, ``out_of_range`` where it leaves the path, ``shape_mismatch`` for
             a law that is not one polynomial in time.
         """
-        if law.dims != 1 or law.weights is not None:
+        if law.dims != 1 or law.rational:
             raise InvalidRequest.of("law", "shape_mismatch", "a time law has one joint and no weights")
         return self._like(*arithmetic.composed(self.breaks, self._whole, law.breaks, law.coefficients[:, :, 0]))
 

@@ -61,7 +61,7 @@ def verify(
     jerk_bounded = not motion.unbounded[3].any()
     return Certificate(
         holds=all(c.holds for c in checks) and all(e is None or e <= TOLERANCE for e in errors),
-        basis="exact" if trajectory.weights is None else "enclosure",
+        basis="enclosure" if trajectory.rational else "exact",
         checks=tuple(checks),
         waypoint_error=waypoint_error,
         boundary_error=boundary_error,
@@ -119,7 +119,7 @@ def _continuity(trajectory: Trajectory, span: float) -> int | None:
     """Return the class: the highest order up to which nothing jumps; -1 if the position does; None for one piece."""
     if trajectory.pieces == 1:
         return None
-    if trajectory.weights is None:
+    if not trajectory.rational:
         highest = list(peaks(trajectory, trajectory.degree + 1))
     else:  # the scale of a derivative is all that counts here
         ends = (np.abs(trajectory.ends(m)) for m in range(trajectory.degree + 1))
@@ -269,7 +269,7 @@ def path_length(trajectory: Trajectory) -> float:
         return 0.0
     slopes = trajectory.coefficients[:-1] * np.arange(trajectory.degree, 0, -1.0)[:, None, None]  # d/du
     noise = 64 * np.finfo(float).eps * np.sqrt((np.abs(slopes).sum(axis=0) ** 2).sum(axis=1))
-    if trajectory.weights is not None:
+    if trajectory.rational:
         return _rational_length(trajectory, noise)
     from .kernels.speed import speeds
 

@@ -43,7 +43,7 @@ def worst(trajectory: Trajectory, gain: Array, shift: Array, row: NDArray[np.int
         Which of the S rows counts for a piece; by default the first.
     """
     row = np.zeros(trajectory.pieces, dtype=np.int64) if row is None else row
-    if trajectory.weights is not None:
+    if trajectory.rational:
         return _from_enclosures(trajectory, gain, shift, row)
     from .kernels.worst import worst as kernel
 

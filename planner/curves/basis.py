@@ -82,7 +82,7 @@ def check_degree(count: int, degree: int) -> None:
     if not 1 <= degree <= MOST_DEGREE:
         raise InvalidRequest.of("/options/degree", "bad_degree", f"must be 1 to {MOST_DEGREE}")
     if count < degree + 1:
-        reason = f"degree {degree} needs at least {degree + 1} waypoints, there are {count}"
+        reason = f"degree {degree} needs at least {degree + 1} waypoints, there are {count}: take a lower degree"
         raise InvalidRequest.of("/waypoints", "too_few_points", reason)
 
 

@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag
 from scipy.linalg import solve_banded
 
 from ..errors import InvalidRequest
+from ..kernels.splines import hermite_states
 from ..options import MAX_TIME, MAX_VALUE
 from ..reading import increasing, matrix, vector
 from ..trajectory import Trajectory
@@ -82,7 +83,10 @@ def cubic_spline(
     C. de Boor, A Practical Guide to Splines, Springer, 1978, chapter IV.
     """
     t = np.asarray(times, dtype=np.float64)
-    x = np.asarray(points, dtype=np.float64)
+    x = np.ascontiguousarray(points, dtype=np.float64)
+    kinds = ends_of(boundary)
+    if set(kinds) <= {"clamped", "natural"}:
+        return _least_bent(t, x, kinds, start, end)
     h = np.diff(t)[:, None]
     d = np.diff(x, axis=0) / h
     if boundary == "periodic":
@@ -90,7 +94,7 @@ def cubic_spline(
     elif boundary == "start_conditions":
         slopes = _from_start(x, h, d, np.asarray(start), np.asarray(start_acceleration))
     else:
-        slopes = _two_ends(h, d, ends_of(boundary), np.asarray(start), np.asarray(end))
+        slopes = _two_ends(h, d, kinds, np.asarray(start), np.asarray(end))
     return Trajectory.from_hermite(t, x, slopes)
 
 
@@ -111,6 +115,16 @@ def move(*pairs: Any) -> Trajectory:
         raise InvalidRequest.of("/waypoints", "too_few_points", "needs at least two waypoints")
     t = increasing(vector(list(times), "/times", largest=MAX_TIME), "/times")
     return cubic_spline(t, matrix([np.atleast_1d(x).tolist() for x in points], "/waypoints"))
+
+
+def _least_bent(t: Array, x: Array, kinds: tuple[str, str], start: ArrayLike, end: ArrayLike) -> Trajectory:
+    """Return the spline that minimises the integral of the squared acceleration, each end's velocity given or free."""
+    ends, states = np.zeros((2, 1, x.shape[1])), np.empty((1, *x.shape))
+    ends[0, 0], ends[1, 0] = start, end
+    fixed = np.array([[kind == "clamped"] for kind in kinds])
+    if not hermite_states(np.diff(t), x, ends, fixed, states):
+        raise OverflowError("the spline's slopes leave the range of floating point")
+    return Trajectory.from_states(t, x, states)
 
 
 def _two_ends(h: Array, d: Array, kinds: tuple[str, str], start: Array, end: Array) -> Array:

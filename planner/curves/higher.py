@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 #: Largest relative jump of the lowest derivative that is not a state of the knots (quintic: the jerk): in a gap much
 #: shorter than its neighbours the states' rounding is all that is left of it.
 CONTINUOUS = 1e-6
+#: Neighbouring steps that differ by less than this factor need no such check.
+EVEN = 30.0
 
 
 class QuinticSplineOptions(Spaced):
@@ -63,11 +65,13 @@ def _odd_spline(name: str, times: ArrayLike, points: ArrayLike, order: int, star
         if given is not None:
             ends[side] = given
     states = np.empty((order - 1, *x.shape))
-    solved = hermite_states(np.diff(t), x, ends, np.ones((2, order - 1), dtype=bool), states)
-    curve, worst = Trajectory.from_hermite(t, x, *states) if solved else None, np.empty(order - 1)
-    if curve is not None:
-        hermite_jumps(np.diff(t), curve.coefficients, worst)
-    if curve is None or not worst[0] <= CONTINUOUS:
+    h, jump = np.diff(t), np.zeros(1)
+    solved = hermite_states(h, x, ends, np.ones((2, order - 1), dtype=bool), states)
+    curve = Trajectory.from_states(t, x, states) if solved else None
+    ratio = h[1:] / h[:-1]
+    if curve is not None and ratio.size and not 1 / EVEN < ratio.min() <= ratio.max() < EVEN:
+        hermite_jumps(h, curve.coefficients, jump)
+    if curve is None or not jump[0] <= CONTINUOUS:
         reason = "times this uneven leave the higher derivatives to rounding: even them out, or use cubic_spline"
         raise Unsupported(name, "times", ["cubic_spline"], reason)
     return curve

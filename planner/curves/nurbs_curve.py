@@ -75,8 +75,6 @@ def nurbs(points: ArrayLike, weights: ArrayLike, knots: ArrayLike, degree: int =
         )
     w = w / w.max()
     breaks, whole = bezier_pieces(t, np.concatenate([x * w[:, None], w[:, None]], axis=1), degree)
-    if (w == w[0]).all():
-        return Trajectory.from_bernstein(breaks, whole[..., :-1])
     coefficients = from_bernstein(whole)
     return Trajectory(breaks, coefficients[..., :-1], coefficients[..., -1])
 

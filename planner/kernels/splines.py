@@ -368,20 +368,21 @@ def hermite_pieces(h, points, states, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def hermite_jumps(h, pieces, worst):  # type: ignore[no-untyped-def]
-    """Write the worst relative jump of the derivatives of order k … 2k-2 at the interior knots into ``worst`` (k - 1,).
+    """Write the worst relative jump of the derivatives of order k, k + 1, … at the interior knots into ``worst``.
 
+    ``worst`` has at most k - 1 entries; beyond order 2k - 2 the spline does jump.
     Relative to what the derivative may be in the longer of the two pieces: the sum of its coefficients' sizes, each
     times the number it takes in that derivative, by the step to the power of the order; NaN if a coefficient is. In a
     gap r times shorter than its neighbour, states of precision eps give the m-th derivative but to about eps r^(m-1).
     """
     size, gaps, dims = pieces.shape
     k = size // 2
-    weight = np.ones((k - 1, size))  # [row, q]: u^q in the derivative of order k + row at u = 1; 1 below that order
-    for row in range(k - 1):
+    weight = np.ones((len(worst), size))  # [row, q]: u^q in the derivative of order k + row at u = 1; 1 below that order
+    for row in range(len(worst)):
         for q in range(k + row, size):
             for s in range(k + row):
                 weight[row, q] *= q - s
-    for row in range(k - 1):
+    for row in range(len(worst)):
         m = k + row
         worst[row] = 0.0
         for i in range(1, gaps):

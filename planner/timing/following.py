@@ -79,7 +79,7 @@ def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: 
     refuse_position_limits(path, request)
     corners = _corners(path.curve, 2 if request.limits.jerk is not None else 1)
     stretches = split(path.curve, corners)
-    timed = [time_stretch(s, Units.of(s, request.limits)) if s.coefficients[:-1].any() else None for s in stretches]
+    timed = [time_stretch(s, Units.of(s, request.limits)) if _moves(s) else None for s in stretches]
     dwell = max(DWELL * sum(t.law.duration for t in timed if t), MIN_STEP)
     laws = [
         Trajectory.from_hermite([0.0, dwell], [[s.start], [s.end]]) if t is None else t.law
@@ -103,6 +103,13 @@ def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: 
         Followed(path.curve, law.scaled(factor)),
         notes=tuple(notes),
     )
+
+
+def _moves(stretch: Trajectory) -> bool:
+    if not stretch.rational:
+        return bool(stretch.coefficients[:-1].any())
+    found = stretch.extrema(1)
+    return bool((found.high - found.low > 1e-12 * np.abs(found.high)).any())
 
 
 def _corners(curve: Trajectory, order: int) -> Array:

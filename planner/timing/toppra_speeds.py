@@ -54,9 +54,12 @@ def toppra_speeds(stretch: Trajectory, limits: Limits, units: Units, grid: Array
     ]
     stations = (grid - stretch.start) / units.parameter
     stations[-1] = Scaled.path_interval[1]
-    instance = toppra.algorithm.TOPPRA(constraints, Scaled(), gridpoints=stations, solver_wrapper="seidel")
-    with np.errstate(all="ignore"):
-        _, speed, _ = instance.compute_parameterization(0.0, 0.0)
+    try:
+        with np.errstate(all="ignore"):
+            instance = toppra.algorithm.TOPPRA(constraints, Scaled(), gridpoints=stations, solver_wrapper="seidel")
+            _, speed, _ = instance.compute_parameterization(0.0, 0.0)
+    except ValueError as error:  # stations that do not increase, say
+        raise SolverFailed("toppra", f"it refuses the path: {error}") from None
     if speed is None or not np.isfinite(speed).all():
         raise SolverFailed("toppra", "no parameterisation found")
     return np.asarray(np.maximum(speed, 0.0) * units.parameter / units.second)
