@@ -15,7 +15,7 @@ export NUMEXPR_NUM_THREADS := 1
 export VECLIB_MAXIMUM_THREADS := 1
 export MPLBACKEND := Agg
 
-.PHONY: help demo test serve check check-slow bench docs constraints clean
+.PHONY: help demo test serve check check-slow bench docs gallery constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## say what there is
@@ -45,6 +45,9 @@ bench: .venv/.bench  ## compare with peers: build/bench/report.md (a fast look w
 
 docs: .venv/.installed  ## rewrite the pages that are made from the code
 	$(PY) -c 'from planner.catalogue import markdown; open("docs/methods.md", "w", encoding="utf-8").write(markdown())'
+
+gallery: .venv/.installed  ## draw the gallery's pictures and rewrite docs/gallery.md
+	$(PY) examples/gallery.py
 
 constraints:  ## take the newest versions that pyproject.toml allows into constraints.txt
 	rm -rf build/constraints

@@ -48,7 +48,7 @@ def solve(request: PlanRequest, options: TimeScaledOptions) -> Solution:
     duration = stretched(least * span, request.duration)
     if duration == 0.0:
         raise InvalidRequest.of("/limits", "missing", "needed: a velocity, acceleration or jerk limit, or times")
-    factor = duration / span
+    factor = least if duration == least * span else duration / span
     for i, bounds in enumerate(request.segment_durations or ()):
         stretched(factor * steps[i], bounds, i)
     begin = 0.0 if request.times is None else float(request.times[0])
