@@ -54,7 +54,8 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     _refuse_unsupported(request, method, can, methods)
     _require(request, can)
     spacing = options.spacing if isinstance(options, Spaced) else "centripetal"
-    if request.times is not None and can.timing == "given" and spacing != "centripetal":
+    fixed = request.times is not None and can.timing == "given"
+    if spacing != "centripetal" and (fixed or can.timing == "chosen"):
         raise InvalidRequest.of("/options/spacing", "conflict", "times are given: nothing is left to be spread")
     notes = []
     if request.wrap is not None:

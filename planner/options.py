@@ -50,6 +50,12 @@ _CODES = {
 }
 
 
+class Conflict(ValueError):
+    """Raised by an option's validator: it contradicts another option."""
+
+    code = "conflict"
+
+
 class Options(BaseModel):
     """Options of a method: frozen, strict, and with no field that is not declared."""
 

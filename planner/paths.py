@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 Coefficient = Annotated[float, Field(ge=-1e100, le=1e100, allow_inf_nan=False)]
 Knots = Annotated[list[Number], Field(min_length=2, fail_fast=True)]
 
+#: Without a spacing, or with the default.
+UNSPACED = (None, "centripetal")
+
 KNOTS = "parameter values of the waypoints, increasing (default: as spacing says)"
 
 
@@ -170,8 +173,8 @@ class PathOptions(Options):
 
     @property
     def fixes_knots(self) -> bool:
-        """Whether every waypoint has a parameter value of its own."""
-        return self.path.knots is not None or self.moves_by_itself
+        """Whether every waypoint has a parameter value, or something else, of its own."""
+        return self.path.knots is not None or self.path.fixes_knots or self.moves_by_itself
 
     @property
     def moves_by_itself(self) -> bool:
@@ -216,9 +219,9 @@ def build_path(option: PathOption, points: Array, boundary: str = "natural", kno
     if option.control_points:
         curve = _moved_errors(lambda: _BY_CONTROL_POINTS[type(option)](option, points, None))
         return Path(curve, np.array([curve.start, curve.end]), passes=False)
+    if (knots if knots is not None else option.knots) is not None and getattr(option, "spacing", None) not in UNSPACED:
+        raise InvalidRequest.of("/options/path/spacing", "conflict", "knots are given: nothing is left to spread")
     if knots is None and option.knots is not None:
-        if isinstance(option, Spaced) and option.spacing != "centripetal":
-            raise InvalidRequest.of("/options/path/spacing", "conflict", "knots are given: nothing is left to spread")
         knots = increasing(vector(option.knots, "/options/path/knots", len(points)), "/options/path/knots")
     if isinstance(option, GivenPath):
         return _given(option, points, knots)
@@ -251,7 +254,7 @@ _BY_CONTROL_POINTS: dict[type[Options], Callable[[Any, Array, DurationBounds | N
 def smoothness(option: PathOption) -> int | None:
     """Return the class that a path of this kind is certain to have; None where its numbers must tell."""
     if isinstance(option, BsplinePath | NurbsPath):
-        return option.degree - 1 if option.knots is None or not option.control_points else None
+        return max(option.degree - 1, 0) if option.knots is None or not option.control_points else None
     if isinstance(option, BezierPath):
         return SMOOTH if option.degree is None else None
     return {
@@ -316,7 +319,7 @@ def refuse_position_limits(path: Path, request: PlanRequest) -> None:
         return
     curve = path.curve.split(path.knots)
     segment = np.clip(np.searchsorted(path.knots, curve.breaks[:-1], side="right") - 1, 0, request.count - 2)
-    found = curve.extrema(1)
+    found = curve.extrema(1, segment)
     lower, upper = limit.lower[segment], limit.upper[segment]
     over = np.stack([found.high[0] - upper, lower - found.low[0]])
     slack = 1e-9 * max(1.0, float(np.ptp(request.waypoints, axis=0).max()))

@@ -9,7 +9,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from .pieces import differentiated, halved, value
+from .pieces import differentiated, halved, product, raised, value
 from .quadrature import integral
 
 Array = NDArray[np.float64]
@@ -46,7 +46,21 @@ def positive(w: Array) -> bool:
     return False
 
 
-def enclosures(a: Array, w: Array, scale: Array) -> tuple[Array, Array, Array, Array]:
+def derivative(a: Array, w: Array, order: int) -> tuple[Array, Array]:
+    """Return numerator and denominator W^(order + 1) of the u-derivative of A / W, as monomial coefficients.
+
+    N_0 = A, N_m = N_(m-1)' W - m N_(m-1) W'.
+    """
+    slope, bottom = differentiated(w, 1), w
+    for m in range(1, order + 1):
+        a = product(differentiated(a, 1), w) - m * product(a, slope)
+        bottom = product(bottom[:, :, None], w)[:, :, 0]
+    return raised(a, len(bottom) - 1), bottom
+
+
+def enclosures(
+    a: Array, w: Array, scale: Array, group: NDArray[np.int64] | None = None
+) -> tuple[Array, Array, Array, Array]:
     """Return bounds of the derivatives of A / W on every piece, and where they are (almost) taken.
 
     Parameters
@@ -55,14 +69,17 @@ def enclosures(a: Array, w: Array, scale: Array) -> tuple[Array, Array, Array, A
         Bernstein coefficients; the denominator is positive.
     scale : (R, K)
         Factor of each order's u-derivative: 1 / duration^m.
+    group : (K,)
+        Which pieces are judged together; by default all.
 
     Returns
     -------
     low, at_low, high, at_high : (R, K, D)
-        No value lies outside; over all pieces the largest and the smallest are tight to 1e-10 of the larger magnitude.
-        The places are values of u.
+        No value lies outside; over each group's pieces the largest and the smallest are tight to 1e-10 of the larger
+        magnitude. The places are values of u.
     """
     pieces = a.shape[1]
+    group = np.zeros(pieces, dtype=np.int64) if group is None else group
     piece, left, width = np.arange(pieces), np.zeros(pieces), np.ones(pieces)
     for _ in range(MOST_HALVINGS):
         uneven = (w.max(axis=0) > EVEN * w.min(axis=0)) | (w.min(axis=0) <= 0)
@@ -79,7 +96,7 @@ def enclosures(a: Array, w: Array, scale: Array) -> tuple[Array, Array, Array, A
             bottom = _times(bottom[:, :, None], w)[:, :, 0]
         top = _elevated(numerator, len(bottom) - 1) * factor[:, None]
         shift = anchor if m == 0 else np.zeros_like(anchor)
-        out.append(_enclosed(top, bottom, shift, (piece, left, width), pieces))
+        out.append(_enclosed(top, bottom, shift, (piece, left, width), group))
     low, at_low, high, at_high = (np.stack(x) for x in zip(*out, strict=True))
     return low, at_low, high, at_high
 
@@ -111,24 +128,26 @@ def squared_integral(whole: Array, rate: Array, order: int, largest: float) -> f
 Places = tuple[NDArray[np.int64], Array, Array]
 
 
-def _enclosed(top: Array, bottom: Array, shift: Array, places: Places, pieces: int) -> tuple[Array, ...]:
+def _enclosed(
+    top: Array, bottom: Array, shift: Array, places: Places, group: NDArray[np.int64]
+) -> tuple[Array, Array, Array, Array]:
     """Return low, at_low, high, at_high (K, D) of shift + top / bottom, by halving where the largest may be."""
     piece, left, width = places
     noise = 16 * np.finfo(float).eps * len(top) * np.abs(top).max(axis=0) / bottom.min(axis=0)[:, None]
-    best_low = best_high = None
-    found = []
+    best_low = np.full((int(group.max()) + 1, top.shape[2]), np.inf)
+    best_high, pieces, found = -best_low, len(group), []
     for level in range(MOST_LEVELS):
         ratio = top / bottom[:, :, None]
         least, most = ratio.min(axis=0) + shift - noise, ratio.max(axis=0) + shift + noise
-        ends = ratio[[0, -1]] + shift
-        lowest, highest = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
-        best_low = lowest if best_low is None else np.minimum(best_low, lowest)
-        best_high = highest if best_high is None else np.maximum(best_high, highest)
-        slack = TIGHT * np.maximum(np.abs(best_low), np.abs(best_high)) + 4 * noise
-        wide = ((most > best_high + slack) | (least < best_low - slack)).any(axis=1)
+        ends = ratio[[0, -1]] + shift  # values that are taken
+        mine = group[piece]
+        np.minimum.at(best_low, mine, ends.min(axis=0))
+        np.maximum.at(best_high, mine, ends.max(axis=0))
+        slack = TIGHT * np.maximum(np.abs(best_low), np.abs(best_high))[mine] + 4 * noise
+        wide = ((most > best_high[mine] + slack) | (least < best_low[mine] - slack)).any(axis=1)
         if level == MOST_LEVELS - 1 or wide.sum() > MOST_INTERVALS:  # what is known holds, only less tightly
             wide[:] = False
-        found.append((piece[~wide], (left + 0.5 * width)[~wide], least[~wide], most[~wide]))
+        found.append((piece[~wide], left[~wide], (left + width)[~wide], least[~wide], most[~wide], *ends[:, ~wide]))
         if not wide.any():
             break
         top, bottom = (np.concatenate(halved(x[:, wide]), axis=1) for x in (top, bottom))
@@ -136,22 +155,30 @@ def _enclosed(top: Array, bottom: Array, shift: Array, places: Places, pieces: i
         half = 0.5 * width[wide]
         left = np.concatenate([left[wide], left[wide] + half])
         piece, width = np.tile(piece[wide], 2), np.tile(half, 2)
-    at, middle, least, most = (np.concatenate(x) for x in zip(*found, strict=True))
-    last_first = np.argsort(-middle, kind="stable")  # so that of equals the earliest is written last
-    at, middle = at[last_first], middle[last_first]
-    high, at_high = _largest(at, middle, most[last_first], pieces)
-    low, at_low = _largest(at, middle, -least[last_first], pieces)
-    return -low, at_low, high, at_high
+    owner = np.concatenate([f[0] for f in found])
+    least, most = (np.concatenate([f[k] for f in found]) for k in (3, 4))
+    high, low = _largest(owner, most, pieces), -_largest(owner, -least, pieces)
+    where = np.concatenate([f[k] for k in (1, 2) for f in found])
+    taken = np.concatenate([f[k] for k in (5, 6) for f in found])
+    latest = np.argsort(-where, kind="stable")  # the last first, so that of equals the earliest is written last
+    owner, where, taken = np.tile(owner, 2)[latest], where[latest], taken[latest]
+    return low, _where_largest(owner, where, -taken, pieces), high, _where_largest(owner, where, taken, pieces)
 
 
-def _largest(piece: NDArray[np.int64], at: Array, values: Array, pieces: int) -> tuple[Array, Array]:
-    """Return the largest of the values (I, D) on each piece and where it is."""
-    out, where = np.full((pieces, values.shape[1]), -np.inf), np.zeros((pieces, values.shape[1]))
+def _largest(piece: NDArray[np.int64], values: Array, pieces: int) -> Array:
+    """Return the largest of the values (I, D) on each piece, (K, D)."""
+    out = np.full((pieces, values.shape[1]), -np.inf)
     np.maximum.at(out, piece, values)
+    return out
+
+
+def _where_largest(piece: NDArray[np.int64], at: Array, values: Array, pieces: int) -> Array:
+    """Return the place of the largest of the values (I, D) on each piece, the last of equal ones in their order."""
+    largest, where = _largest(piece, values, pieces), np.zeros((pieces, values.shape[1]))
     for joint in range(values.shape[1]):
-        row = np.flatnonzero(values[:, joint] == out[piece, joint])
+        row = np.flatnonzero(values[:, joint] == largest[piece, joint])
         where[piece[row], joint] = at[row]
-    return out, where
+    return where
 
 
 def _split(b: Array, where: NDArray[np.bool_]) -> Array:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import pieces as arithmetic
 from .errors import InvalidRequest
+from .rational import derivative as rational_derivative
 from .rational import enclosures, positive, quotient, squared_integral
 
 Array = NDArray[np.float64]
@@ -82,10 +83,9 @@ class Trajectory:
                 raise InvalidRequest.of("", "bad_weights", "the denominator must be positive on every piece")
             weights.setflags(write=False)
             object.__setattr__(self, "weights", weights)
-        for array in (breaks, coefficients):
+        for name, array in (("breaks", breaks), ("coefficients", coefficients)):
             array.setflags(write=False)
-        object.__setattr__(self, "breaks", breaks)
-        object.__setattr__(self, "coefficients", coefficients)
+            object.__setattr__(self, name, array)
 
     # -- making ------------------------------------------------------------------------------------------------------
 
@@ -130,7 +130,7 @@ class Trajectory:
     @classmethod
     def from_states(cls, breaks: Array, points: Array, states: Array) -> "Trajectory":
         """Return the same from points (N, D) and the derivatives in one array (k - 1, N, D), C-contiguous."""
-        from .kernels.splines import hermite_pieces
+        from .kernels.hermite import hermite_pieces
 
         out = np.empty((2 * len(states) + 2, len(breaks) - 1, points.shape[1]))
         hermite_pieces(np.diff(breaks), points, states, out)
@@ -140,6 +140,11 @@ class Trajectory:
     @classmethod
     def concatenate(cls, parts: Sequence["Trajectory"]) -> "Trajectory":
         """Return the parts one after the other; each starts where, in time, the one before it ends."""
+        if not parts or len({p.dims for p in parts}) > 1:
+            raise InvalidRequest.of("parts", "shape_mismatch", "needs at least one part, all of the same joints")
+        gaps = np.array([b.start - a.end for a, b in zip(parts[:-1], parts[1:], strict=True)])
+        if (np.abs(gaps) > 1e-12 * max(abs(parts[-1].end), 1.0)).any():
+            raise InvalidRequest.of("parts", "not_increasing", "each part must start when the one before it ends")
         degree = max(p.degree for p in parts)
         breaks = np.concatenate([parts[0].breaks[:1]] + [p.breaks[1:] for p in parts])
         whole = np.concatenate([arithmetic.raised(p._homogeneous, degree) for p in parts], axis=1)
@@ -197,10 +202,6 @@ class Trajectory:
         """Whether there is a denominator other than 1."""
         return self.weights is not None and bool((self.weights[:-1] != 0.0).any() or (self.weights[-1] != 1.0).any())
 
-    @property
-    def _whole(self) -> Array:
-        return self.coefficients if self.weights is None else self._homogeneous
-
     def powers(self) -> Array:
         """Return ``[k, i, d]`` = coefficient of (t - breaks[i])^k, lowest power first."""
         scale = self.rates ** np.arange(self.degree + 1)[:, None]
@@ -243,6 +244,8 @@ class Trajectory:
         shape = (orders, t.size, self.dims)
         if out is not None and (out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous):
             raise ValueError(f"out must be a C-contiguous array of float64 of shape {shape}")
+        if first < 0:
+            raise InvalidRequest.of("order", "out_of_range", "must be at least 0")
         flat = np.ascontiguousarray(t).reshape(-1)
         if not self.rational:
             out = np.empty(shape) if out is None else out
@@ -260,13 +263,8 @@ class Trajectory:
         if self.weights is None or order == 0:
             scale = (self.rates**order)[:, None]
             return Trajectory(self.breaks, arithmetic.differentiated(self.coefficients, order) * scale, self.weights)
-        a, w = self.coefficients, self.weights
-        top = arithmetic.product(arithmetic.differentiated(a, 1), w)
-        minus = arithmetic.product(a, arithmetic.differentiated(w, 1))
-        bottom = arithmetic.product(w[:, :, None], w)[:, :, 0]
-        size = len(bottom) - 1
-        grown = arithmetic.raised((top - minus) * self.rates[:, None], size)
-        return Trajectory(self.breaks, grown, bottom).derivative(order - 1)
+        top, bottom = rational_derivative(self.coefficients, self.weights, order)
+        return Trajectory(self.breaks, top * (self.rates**order)[:, None], bottom)
 
     def ends(self, order: int) -> tuple[Array, Array]:
         """Return the derivative at the left and at the right end of every piece, each (K, D)."""
@@ -284,15 +282,18 @@ class Trajectory:
         left, right = self.ends(order)
         return np.asarray(left[1:] - right[:-1])
 
-    def extrema(self, orders: int = 4) -> Extrema:
-        """Return the exact extrema of the derivatives of order 0 … orders-1, piece by piece."""
+    def extrema(self, orders: int = 4, group: NDArray[np.int64] | None = None) -> Extrema:
+        """Return the exact extrema of the derivatives of order 0 … orders-1, piece by piece.
+
+        Those of rational pieces are tight over the pieces that have the same number in ``group`` (K,).
+        """
         from .kernels.extrema import extrema
 
         scale = self.rates ** np.arange(orders)[:, None]
         h, t = np.diff(self.breaks)[:, None], self.breaks[:-1, None]
         if self.rational:
             bernstein = arithmetic.to_bernstein(self._homogeneous)
-            low, at_low, high, at_high = enclosures(bernstein[..., :-1], bernstein[..., -1], scale)
+            low, at_low, high, at_high = enclosures(bernstein[..., :-1], bernstein[..., -1], scale, group)
         else:
             low, at_low, high, at_high = extrema(self.coefficients, orders)
             low, high = low * scale[:, :, None], high * scale[:, :, None]
@@ -327,22 +328,21 @@ class Trajectory:
     def reversed(self) -> "Trajectory":
         """Return the trajectory run backwards over the same span: x(start + end - t)."""
         one = np.ones(self.pieces)
-        turned = arithmetic.restricted(self._whole, one, -one)[:, ::-1]
-        breaks = (self.start + self.end - self.breaks)[::-1].copy()
-        breaks[0], breaks[-1] = self.start, self.end
-        return self._like(breaks, turned)
+        turned = arithmetic.restricted(self._homogeneous, one, -one)[:, ::-1]
+        inner = (self.start + self.end - self.breaks)[-2:0:-1]
+        return self._like(np.concatenate([[self.start], inner, [self.end]]), turned)
 
     def mapped(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Trajectory":
         """Return A x(t) + b for a matrix A (E, D) and an offset b (E,)."""
-        a = np.asarray(matrix, dtype=np.float64)
-        if a.ndim != 2 or a.shape[1] != self.dims:
-            raise InvalidRequest.of("matrix", "shape_mismatch", f"expected E rows of {self.dims} entries")
-        image = np.asarray(self.coefficients @ a.T)
-        image += self._homogeneous[:, :, -1:] * np.broadcast_to(np.asarray(offset, dtype=np.float64), (len(a),))
-        return replace(self, coefficients=image)
+        a, b = np.asarray(matrix, dtype=np.float64), np.asarray(offset, dtype=np.float64)
+        if a.ndim != 2 or a.shape[1] != self.dims or b.shape not in ((), (len(a),)):
+            raise InvalidRequest.of("matrix", "shape_mismatch", f"needs E rows of {self.dims} entries and E offsets")
+        return replace(self, coefficients=self.coefficients @ a.T + self._homogeneous[:, :, -1:] * b)
 
     def joints(self, chosen: Sequence[int]) -> "Trajectory":
         """Return the trajectory of some of the joints, in the order named."""
+        if not chosen or not all(-self.dims <= k < self.dims for k in chosen):
+            raise InvalidRequest.of("joints", "out_of_range", f"must name joints from 0 to {self.dims - 1}")
         return replace(self, coefficients=self.coefficients[:, :, list(chosen)])
 
     def sliced(self, start: float, end: float) -> "Trajectory":
@@ -371,7 +371,7 @@ class Trajectory:
         extra = extra[~np.isin(extra, self.breaks)]
         if not len(extra):
             return self
-        return self._like(*arithmetic.cut(self.breaks, self._whole, extra))
+        return self._like(*arithmetic.cut(self.breaks, self._homogeneous, extra))
 
     def compose(self, law: "Trajectory") -> "Trajectory":
         """Return self(law(t)): this path run through by a non-decreasing law s(t), exactly.
@@ -393,7 +393,7 @@ class Trajectory:
         """
         if law.dims != 1 or law.rational:
             raise InvalidRequest.of("law", "shape_mismatch", "a time law has one joint and no weights")
-        return self._like(*arithmetic.composed(self.breaks, self._whole, law.breaks, law.coefficients[:, :, 0]))
+        return self._like(*arithmetic.composed(self.breaks, self._homogeneous, law.breaks, law.coefficients[:, :, 0]))
 
     def _like(self, breaks: Array, whole: Array) -> "Trajectory":
         """Return a trajectory from coefficients, which hold a denominator where this one has one."""

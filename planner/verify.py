@@ -116,7 +116,10 @@ def position_span(points: Array | Trajectory) -> float:
 
 
 def _continuity(trajectory: Trajectory, span: float) -> int | None:
-    """Return the class: the highest order up to which nothing jumps; -1 if the position does; None for one piece."""
+    """Return the class: the highest order up to which nothing jumps; -1 if the position does.
+
+    None for one piece, and for pieces of one and the same polynomial.
+    """
     if trajectory.pieces == 1:
         return None
     if not trajectory.rational:
@@ -127,7 +130,7 @@ def _continuity(trajectory: Trajectory, span: float) -> int | None:
     for order, peak in enumerate(highest):
         if counted_jumps(trajectory, order, peak, span).any():
             return order - 1
-    return trajectory.degree
+    return trajectory.degree if trajectory.rational else None
 
 
 def _limit_rows(motion: _Motion) -> list[Check]:

@@ -76,7 +76,7 @@ def measures(lower: Array, upper: Array, scale: Array | None = None) -> tuple[Ar
 
 def _from_enclosures(trajectory: Trajectory, gain: Array, shift: Array, row: NDArray[np.int64]) -> Worst:
     orders = gain.shape[1]
-    found = trajectory.extrema(orders)
+    found = trajectory.extrema(orders, row)
     values, at = np.stack([found.high, found.low]), np.stack([found.at_high, found.at_low])
     badness = gain[:, :, row] * values + shift[:, :, row]  # (2, R, K, D)
     flat = badness.transpose(2, 0, 1, 3).reshape(-1, orders, trajectory.dims)  # by piece, then side

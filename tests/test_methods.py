@@ -18,7 +18,10 @@ ASYMMETRIC = {
 STATE = {"velocity": [0.1, -0.2, 0.0]}
 
 REQUESTS = {
-    **{name: {k: v for k, v in c.request.items() if k not in ("sampling", "include", "method", "options")} for name, c in CASES.items()},
+    **{
+        name: {k: v for k, v in c.request.items() if k not in ("sampling", "include", "method", "options")}
+        for name, c in CASES.items()
+    },
     "times": {"waypoints": POINTS, "times": TIMES},
     "two_points": {"waypoints": [[0.0], [1.0]], "times": [0, 2]},
     "times_velocity": {"waypoints": POINTS, "times": TIMES, "limits": {"velocity": 4.0}},

@@ -1,16 +1,16 @@
 """The interpolating polynomial: barycentric evaluation, Chebyshev nodes, and how well conditioned a set of nodes is."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from ..errors import InvalidRequest
-from ..options import MAX_TIME
+from ..options import MAX_TIME, Conflict
 from ..trajectory import Trajectory
 from .newton import newton_trajectory
-from .options import Spaced
+from .options import Spaced, checked
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,13 @@ class PolynomialOptions(Spaced):
     interval: Annotated[list[Time], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="[a, b] in s, for chebyshev: the whole motion; the nodes lie inside"
     )
+
+    @field_validator("interval")
+    @classmethod
+    def _belongs(cls, interval: Any, info: ValidationInfo) -> Any:
+        if interval is not None and info.data.get("nodes") == "given":
+            raise Conflict("belongs to nodes chebyshev: the times are given")
+        return interval
 
     @property
     def fixes_knots(self) -> bool:
@@ -136,7 +143,9 @@ def polynomial(times: ArrayLike, points: ArrayLike, start: float | None = None, 
     ----------
     N. J. Higham, The numerical stability of barycentric Lagrange interpolation, IMA J. Numer. Anal. 24, 2004.
     """
-    t, x = np.asarray(times, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    t, x = checked(times, points, fewest=1)
+    if len(t) == 1 and start is None and end is None:
+        return Trajectory.hold(x[0], float(t[0]), float(t[0]))
     start, end = float(t[0]) if start is None else start, float(t[-1]) if end is None else end
     refuse_ill_conditioned(t, start, end, "cubic_spline", "polynomial with nodes chebyshev")
     curve = newton_trajectory(t, x, None, start, end)

@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError, solve_banded
 from ..errors import InvalidRequest
 from ..limits import DurationBounds
 from ..trajectory import Trajectory
-from .options import Number, Spaced, clock, refuse_other_span
+from .options import Number, Spaced, checked, clock, refuse_other_span
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -210,7 +210,7 @@ def interpolating_points(times: ArrayLike, points: ArrayLike, knots: ArrayLike, 
         ``bad_knots`` where a waypoint lies outside its basis function (Schoenberg-Whitney), or where they do not span
         the times.
     """
-    t, x = np.asarray(times, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    t, x = checked(times, points)
     u = checked_knots(knots, len(x), degree)
     where = "/options/knots"
     if u[degree] != t[0] or u[len(x)] != t[-1]:

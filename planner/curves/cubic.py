@@ -12,7 +12,7 @@ from ..kernels.splines import hermite_states
 from ..options import MAX_TIME, MAX_VALUE
 from ..reading import increasing, matrix, vector
 from ..trajectory import Trajectory
-from .options import Spaced
+from .options import Spaced, checked
 
 Array = NDArray[np.float64]
 
@@ -82,8 +82,7 @@ def cubic_spline(
     ----------
     C. de Boor, A Practical Guide to Splines, Springer, 1978, chapter IV.
     """
-    t = np.asarray(times, dtype=np.float64)
-    x = np.ascontiguousarray(points, dtype=np.float64)
+    t, x = checked(times, points)
     kinds = ends_of(boundary)
     if set(kinds) <= {"clamped", "natural"}:
         return _least_bent(t, x, kinds, start, end)

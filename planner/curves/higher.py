@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import Unsupported
-from ..kernels.splines import hermite_jumps, hermite_states
+from ..kernels.hermite import hermite_jumps
+from ..kernels.splines import hermite_states
 from ..trajectory import Trajectory
-from .options import Spaced
+from .options import Spaced, checked
 
 Array = NDArray[np.float64]
 
@@ -58,8 +59,7 @@ def septic_spline(times: ArrayLike, points: ArrayLike, start: Any = None, end: A
 
 def _odd_spline(name: str, times: ArrayLike, points: ArrayLike, order: int, start: Any, end: Any) -> Trajectory:
     r"""Return the spline of degree 2 k - 1 and class C^(2k-2): it minimises \int |x^(k)|^2 among all such curves."""
-    t = np.ascontiguousarray(times, dtype=np.float64)
-    x = np.ascontiguousarray(points, dtype=np.float64)
+    t, x = checked(times, points)
     ends = np.zeros((2, order - 1, x.shape[1]))
     for side, given in enumerate((start, end)):
         if given is not None:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Discriminator, Field, Tag
 
 from ..trajectory import Trajectory
-from .options import Matrix, Spaced, rows_of
+from .options import Matrix, Spaced, checked, derivatives, rows_of
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,16 @@ class CubicHermiteOptions(Spaced):
         "to the one after), finite_difference (mean of both slopes), monotone (no overshoot)",
     )
 
+    @property
+    def fixes_knots(self) -> bool:
+        """Whether every waypoint has a tangent of its own."""
+        return not isinstance(self.tangents, str)
+
+    @property
+    def moves_by_itself(self) -> bool:
+        """Whether there are tangents, which move equal waypoints too."""
+        return not isinstance(self.tangents, str)
+
 
 def tangents(times: ArrayLike, points: ArrayLike, rule: Rule = "catmull_rom") -> Array:
     """Return velocities at the points, (N, D), from slopes d_i = (x_{i+1} - x_i) / (t_{i+1} - t_i).
@@ -42,7 +52,7 @@ def tangents(times: ArrayLike, points: ArrayLike, rule: Rule = "catmull_rom") ->
     ----------
     F. N. Fritsch and R. E. Carlson, Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17(2), 1980.
     """
-    t, x = np.asarray(times, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    t, x = checked(times, points)
     d = np.diff(x, axis=0) / np.diff(t)[:, None]
     if rule == "catmull_rom":
         inner = (x[2:] - x[:-2]) / (t[2:] - t[:-2])[:, None]
@@ -78,8 +88,9 @@ def cubic_hermite(times: ArrayLike, points: ArrayLike, velocities: ArrayLike | N
     times : (N,), increasing
     points, velocities : (N, D)
     """
-    rates = tangents(times, points) if velocities is None else velocities
-    return Trajectory.from_hermite(times, points, rates)
+    t, x = checked(times, points)
+    rates = tangents(t, x) if velocities is None else derivatives(velocities, x, "/options/tangents")
+    return Trajectory.from_hermite(t, x, rates)
 
 
 def from_options(options: CubicHermiteOptions, times: Array, points: Array) -> Trajectory:

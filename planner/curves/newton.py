@@ -62,9 +62,10 @@ def newton_trajectory(nodes: Array, values: Array, slopes: Array | None, start: 
         newton.append(table[0])
     degree = len(z) - 1
     pieces = 1 if degree <= ONE_PIECE else degree
-    s = -2.0 * np.cos(np.pi * np.arange(pieces + 1) / pieces)
-    breaks = middle + unit * s
+    breaks = middle - 2.0 * unit * np.cos(np.pi * np.arange(pieces + 1) / pieces)
     breaks[0], breaks[-1] = start, end
+    breaks = _onto_nodes(breaks, np.sort(nodes))
+    s = (breaks - middle) / unit
     left, width = s[:-1, None], np.diff(s)[:, None]
     taylor = np.zeros((min(degree, TERMS) + 1, pieces, values.shape[1]))  # lowest power first
     taylor[0] = newton[-1]
@@ -74,3 +75,12 @@ def newton_trajectory(nodes: Array, values: Array, slopes: Array | None, start: 
         shifted[0] += newton[k]
         taylor = shifted
     return Trajectory(breaks, trimmed(taylor[::-1]))
+
+
+def _onto_nodes(breaks: Array, nodes: Array) -> Array:
+    """Return the breaks, inner ones that nearly meet a node put there: no sliver is left between the two."""
+    inner, reach = breaks[1:-1], 0.05 * np.minimum(np.diff(breaks)[:-1], np.diff(breaks)[1:])
+    after = np.clip(np.searchsorted(nodes, inner), 1, max(len(nodes) - 1, 1))
+    for k in (after - 1, np.minimum(after, len(nodes) - 1)):
+        inner = np.where(np.abs(nodes[k] - inner) <= reach, nodes[k], inner)
+    return np.concatenate([breaks[:1], inner, breaks[-1:]])

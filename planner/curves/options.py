@@ -3,15 +3,18 @@
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from ..errors import InvalidRequest
 from ..limits import DurationBounds
 from ..options import MAX_VALUE, Options
-from ..reading import matrix
+from ..pieces import finite
+from ..reading import increasing, matrix
 from ..trajectory import Trajectory
 from .spacing import Spacing
+
+Array = NDArray[np.float64]
 
 Number = Annotated[float, Field(ge=-MAX_VALUE, le=MAX_VALUE, allow_inf_nan=False)]
 Matrix = Annotated[list[Annotated[list[Number], Field(fail_fast=True)]], Field(fail_fast=True)]
@@ -25,6 +28,45 @@ class Spaced(Options):
         description="how the waypoints are spread where no times or knots are sent: by steps that grow as the square "
         "root of the distance, as the distance, or all alike",
     )
+
+
+def checked(times: ArrayLike, points: ArrayLike, fewest: int = 2) -> tuple[Array, Array]:
+    """Return times (N,) and points (N, D) as contiguous arrays; points (N,) are one joint.
+
+    Raises
+    ------
+    InvalidRequest
+        ``too_few_points``, ``shape_mismatch``, ``not_finite`` or ``not_increasing``.
+    """
+    t, x = (np.ascontiguousarray(a, dtype=np.float64) for a in (times, points))
+    x = x[:, None] if x.ndim == 1 else x
+    if t.ndim != 1 or x.ndim != 2 or len(t) != len(x):
+        raise InvalidRequest.of(
+            "/times", "shape_mismatch", f"times {t.shape} and points {x.shape} do not belong together"
+        )
+    if len(x) < fewest or not x.shape[1]:
+        raise InvalidRequest.of("/waypoints", "too_few_points", f"needs at least {fewest}, of one joint or more")
+    for name, values in (("/times", t), ("/waypoints", x)):
+        if not finite(values):
+            raise InvalidRequest.of(name, "not_finite", "must be finite")
+    return increasing(t, "/times"), x
+
+
+def derivatives(values: ArrayLike, points: Array, field: str) -> Array:
+    """Return derivatives at the points, (N, D); (N,) are those of one joint.
+
+    Raises
+    ------
+    InvalidRequest
+        ``shape_mismatch`` or ``not_finite``.
+    """
+    v = np.asarray(values, dtype=np.float64)
+    v = v[:, None] if v.ndim == 1 else v
+    if v.shape != points.shape:
+        raise InvalidRequest.of(field, "shape_mismatch", f"needs the points' shape {points.shape}, has {v.shape}")
+    if not finite(v):
+        raise InvalidRequest.of(field, "not_finite", "must be finite")
+    return v
 
 
 def rows_of(value: list[list[float]], shape: tuple[int, ...], field: str) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from ..trajectory import Trajectory
 from .barycentric import refuse_ill_conditioned, refuse_missed
 from .local_hermite import tangents
 from .newton import newton_trajectory
-from .options import Matrix, Spaced, rows_of
+from .options import Matrix, Spaced, checked, derivatives, rows_of
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,16 @@ class HermiteOptions(Spaced):
         default=None,
         description="N×D velocities at the waypoints, unit/s (default: finite differences, with a warning)",
     )
+
+    @property
+    def fixes_knots(self) -> bool:
+        """Whether every waypoint has a velocity of its own."""
+        return self.velocities is not None
+
+    @property
+    def moves_by_itself(self) -> bool:
+        """Whether there are velocities, which move equal waypoints too."""
+        return self.velocities is not None
 
 
 def hermite(times: ArrayLike, points: ArrayLike, velocities: ArrayLike) -> Trajectory:
@@ -43,9 +53,10 @@ def hermite(times: ArrayLike, points: ArrayLike, velocities: ArrayLike) -> Traje
     ----------
     J. Stoer and R. Bulirsch, Introduction to Numerical Analysis, Springer, 2002, section 2.1.5.
     """
-    t, x = np.asarray(times, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    t, x = checked(times, points)
+    v = derivatives(velocities, x, "/options/velocities")
     refuse_ill_conditioned(t, float(t[0]), float(t[-1]), "cubic_hermite", twice=True)
-    curve = newton_trajectory(t, x, np.asarray(velocities, dtype=np.float64), float(t[0]), float(t[-1]))
+    curve = newton_trajectory(t, x, v, float(t[0]), float(t[-1]))
     refuse_missed(curve, t, x, "cubic_hermite")
     return curve
 

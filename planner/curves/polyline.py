@@ -1,10 +1,9 @@
 """Piecewise linear interpolation."""
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..trajectory import Trajectory
-from .options import Spaced
+from .options import Spaced, checked
 
 
 class LinearOptions(Spaced):
@@ -19,4 +18,4 @@ def linear(times: ArrayLike, points: ArrayLike) -> Trajectory:
     times : (N,), increasing
     points : (N, D)
     """
-    return Trajectory.from_hermite(times, np.asarray(points, dtype=np.float64))
+    return Trajectory.from_hermite(*checked(times, points))

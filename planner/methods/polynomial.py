@@ -11,8 +11,6 @@ from ..types import MIN_STEP, PlanRequest, Solution, Stats
 def solve(request: PlanRequest, options: PolynomialOptions) -> Solution:
     """Return the one polynomial through all waypoints, at the given times or at Chebyshev nodes."""
     if options.nodes == "given":
-        if options.interval is not None:
-            raise InvalidRequest.of("/options/interval", "conflict", "belongs to nodes chebyshev: the times are given")
         assert request.times is not None
         return Solution(polynomial(request.times, request.waypoints), request.times, Stats("newton_form"))
     if options.interval is None:

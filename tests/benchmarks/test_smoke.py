@@ -52,6 +52,34 @@ def test_toppra_is_read_at_the_right_waypoint_times(rows):
     assert float(rows["path", "toppra quick start"]["waypoint_error"]) < 1e-4
 
 
+@pytest.fixture(scope="module")
+def figures(out):
+    with (out / "kernels.csv").open(encoding="utf-8") as file:
+        return {r["name"]: r for r in csv.DictReader(file)}
+
+
+def test_all_kernels_and_curves_are_measured_without_goals_for_small_sizes(figures):
+    calls = {"sampling", "sampling, over filling", "sampling at random", "sampling every piece"}
+    calls |= {"extrema", "extrema, kernel", "verdict", "certificate", "polynomial"}
+    curves = ("cubic_spline", "quintic_spline", "septic_spline", "bspline")
+    assert set(figures) == calls | {f"{curve}, N = {count}" for curve in curves for count in ("10^3", "10^4")}
+    assert all(float(f["ours_ms"]) > 0 and f["rounds"] == "1" for f in figures.values())
+    assert {name for name, f in figures.items() if not f["ratio"]} == {"certificate"}
+    assert {f["goal"] for f in figures.values()} == {""}
+
+
+def test_kernels_and_curves_agree_with_their_peers(figures):
+    assert {name for name, f in figures.items() if f["agrees"] != "True"} == set()
+    assert {name for name, f in figures.items() if not f["difference"]} == {"certificate", "sampling, over filling"}
+
+
+def test_the_report_has_a_table_of_kernels(out, figures):
+    report = (out / "report.md").read_text(encoding="utf-8")
+    section = report.partition("## Kernels and curves\n")[2].partition("\n## ")[0]
+    told = [line.split(" | ")[0].removeprefix("| ") for line in section.splitlines() if line.startswith("| ")]
+    assert told == ["call", "---", *figures]
+
+
 def test_the_report_tells_the_machine_and_splits_a_request(out):
     report = (out / "report.md").read_text(encoding="utf-8")
     assert "Measured on" in report and "toppra 0." in report

@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
-from planner.kernels.splines import hermite_jumps, hermite_pieces, hermite_states
+from planner.kernels.hermite import hermite_jumps, hermite_pieces
+from planner.kernels.splines import hermite_states
 
 Array = NDArray[np.float64]
 SEEDS = range(3)
