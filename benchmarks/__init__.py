@@ -1,5 +1,6 @@
 """Our methods beside the documented calls of toppra, ruckig and scipy, on the same problems and under one certificate.
 
 Four parts: ``cases`` (the problems), ``adapters`` (one file a peer), ``rows`` (measure and judge), ``report`` (CSV and
-Markdown); ``service`` splits the time of a request. Run with ``make bench`` or ``python -m benchmarks``.
+Markdown); ``kernels`` measures sampling, extrema, verdicts and the making of curves by themselves, ``service`` splits
+the time of a request. Run with ``make bench`` or ``python -m benchmarks``.
 """

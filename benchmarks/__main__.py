@@ -12,12 +12,14 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, write CSV and report, and say where they are."""
-    from . import report, rows, service
+    from . import kernels, report, rows, service
     from .cases import problems
 
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Our methods beside their peers.")
-    parser.add_argument("--quick", action="store_true", help="few problems, one round: does everything run?")
-    parser.add_argument("--only", default="", metavar="WORD", help="only problems with this in their name")
+    parser.add_argument(
+        "--quick", action="store_true", help="few problems, small sizes, one round: does everything run?"
+    )
+    parser.add_argument("--only", default="", metavar="WORD", help="only problems and kernels with this in their name")
     parser.add_argument("--out", type=Path, default=Path("build/bench"), help="folder for report.md and the CSV files")
     asked = parser.parse_args(arguments)
     measured = []
@@ -25,8 +27,10 @@ def main(arguments: list[str] | None = None) -> int:
         if asked.only in problem.name:
             print(f"{problem.group}: {problem.name}", file=sys.stderr, flush=True)
             measured += rows.measure(problem, 1 if asked.quick else rows.ROUNDS)
+    print("kernels and curves", file=sys.stderr, flush=True)
+    figures = kernels.measure(asked.quick, asked.only)
     splits = service.measure(3 if asked.quick else 30)
-    print(report.write(measured, splits, asked.out))
+    print(report.write(measured, figures, splits, asked.out))
     return 0
 
 

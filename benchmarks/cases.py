@@ -16,8 +16,9 @@ DATA = Path(__file__).parent.parent / "tests" / "data"
 #: What a group asks, and by what its answers are compared: the sentences are printed above its tables.
 GROUPS = {
     "times": "Through waypoints at given times. The smaller the squared jerk, the better; limits, where there are any, "
-    "must be kept. `minimum_jerk` and the quintic spline begin and end without acceleration, which the cubic ones do "
-    "not: that costs jerk.",
+    "must be kept. `minimum_jerk` and the quintic spline begin and end without acceleration, the septic one without "
+    "jerk either, which the cubic ones do not: that costs jerk. The B-spline and the polynomials do not even begin and "
+    "end at rest, as the best known does. One polynomial through many waypoints is refused, and then left out.",
     "path": "Along a given path (a cubic spline), at rest at both ends, under velocity and acceleration limits, in one "
     "case also under jerk limits. The shorter, the better.",
     "waypoints": "Through waypoints in this order, at rest at both ends, under velocity, acceleration and jerk limits, "

@@ -13,6 +13,7 @@ from typing import Any
 from planner import __version__
 
 from .cases import GROUPS
+from .kernels import JOINTS, Figure
 from .rows import Row
 from .service import PARTS, Split
 
@@ -34,26 +35,38 @@ rest to rest) and scipy, on the same problems. Made by `make bench`.
   possible, not what any entry here reached.
 """
 
+KERNELS = f"""Single calls, one thread, process time, ours and the peer's in turn; results are compared before they are
+timed. Ours are the calls that users make, with all their checks, unless a kernel is named. Curves have {JOINTS} joints,
+uneven times and random waypoints; ours come as pieces, while `make_interp_spline` leaves B-spline coefficients.
+
+- **Ratio**: the peer's time over ours, median of the rounds; the *goal* is the least it should be.
+- **ns an item**: our time by sample, piece or waypoint. **Growth**: the same over that of the smallest N; 1 is linear.
+- **Difference**: the largest between the results, relative to the largest value.
+"""
+
 SUMMARY = "Above 1: slower than the first peer, in the last column worse than the best known.\n"
 
 
-def write(rows: Sequence[Row], splits: Sequence[Split], out: Path) -> Path:
-    """Write ``rows.csv``, ``service.csv`` and ``report.md`` to a folder; return the report's path."""
+def write(rows: Sequence[Row], figures: Sequence[Figure], splits: Sequence[Split], out: Path) -> Path:
+    """Write ``rows.csv``, ``kernels.csv``, ``service.csv`` and ``report.md`` to a folder; return the report's path."""
     out.mkdir(parents=True, exist_ok=True)
     _csv(out / "rows.csv", [asdict(r) for r in rows])
+    _csv(out / "kernels.csv", [{**asdict(f), "each_ns": f.each_ns, "met": f.met} for f in figures])
     _csv(out / "service.csv", [{**asdict(s), "rest": s.rest} for s in splits])
     report = out / "report.md"
-    report.write_text(markdown(rows, splits), encoding="utf-8")
+    report.write_text(markdown(rows, figures, splits), encoding="utf-8")
     return report
 
 
-def markdown(rows: Sequence[Row], splits: Sequence[Split]) -> str:
+def markdown(rows: Sequence[Row], figures: Sequence[Figure], splits: Sequence[Split]) -> str:
     """Return the report."""
     parts = [INTRODUCTION, machine(), "## Summary\n", SUMMARY, summary(rows)]
     for group, about in GROUPS.items():
         parts += [f"## {group.capitalize()}\n", f"{about}\n"]
         for problem in dict.fromkeys(r.problem for r in rows if r.group == group):
             parts += [_problem([r for r in rows if r.problem == problem])]
+    if figures:
+        parts += ["## Kernels and curves\n", KERNELS, _kernels(figures)]
     if splits:
         parts += ["## Where a request's time goes\n", _service(splits)]
     return "\n".join(parts)
@@ -111,6 +124,27 @@ def _problem(rows: Sequence[Row]) -> str:
     ]
     heads = "entry,certified,duration s,squared jerk,velocity,acceleration,jerk,ms,solving,x,what is broken".split(",")
     return f"### {rows[0].problem}{best}\n\n{_table(heads, lines)}"
+
+
+def _kernels(figures: Sequence[Figure]) -> str:
+    lines = [
+        [
+            f.name,
+            f.what,
+            _number(f.ours_ms, ".3g"),
+            f.peer,
+            _number(f.peer_ms, ".3g"),
+            _number(f.ratio, ".3g"),
+            "" if f.goal is None else f"≥ {f.goal:.3g}",
+            "" if f.met is None else "yes" if f.met else "**no**",
+            _number(f.each_ns, ".0f" if (f.each_ns or 0.0) >= 100 else ".3g"),
+            _number(f.growth, ".2f"),
+            "" if f.difference is None else f"{f.difference:.0e}" + ("" if f.agrees else " **(not timed)**"),
+        ]
+        for f in figures
+    ]
+    heads = "call,what,ours ms,peer,peer ms,ratio,goal,met,ns an item,growth,difference".split(",")
+    return _table(heads, lines)
 
 
 def _service(splits: Sequence[Split]) -> str:

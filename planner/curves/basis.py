@@ -8,6 +8,7 @@ from pydantic import Field
 from scipy.linalg import LinAlgError, solve_banded
 
 from ..errors import InvalidRequest
+from ..kernels import bspline as kernel
 from ..limits import DurationBounds
 from ..trajectory import Trajectory
 from .options import Number, Spaced, checked, clock, refuse_other_span
@@ -117,23 +118,21 @@ def basis_values(knots: Array, degree: int, times: Array) -> tuple[Indices, Arra
     B_i^p = (t - t_i) / (t_{i+p} - t_i) B_i^{p-1} + (t_{i+p+1} - t) / (t_{i+p+1} - t_{i+1}) B_{i+1}^{p-1}, 0/0 = 0.
     """
     j = spans(knots, degree, times)
-    values = np.zeros((len(times), degree + 1))
-    values[:, 0] = 1.0
-    for p in range(1, degree + 1):
-        left = knots[j[:, None] - np.arange(p)[::-1]]  # t_{j-p+1} … t_j
-        right = knots[j[:, None] + 1 + np.arange(p)]  # t_{j+1} … t_{j+p}
-        share = values[:, :p] / (right - left)
-        values[:, : p + 1] = 0.0
-        values[:, :p] += share * (right - times[:, None])
-        values[:, 1 : p + 1] += share * (times[:, None] - left)
+    values = np.empty((len(times), degree + 1))
+    kernel.basis(knots, degree, j, times, values)
     return j, values
 
 
 def de_boor(knots: ArrayLike, points: ArrayLike, degree: int, time: float) -> Array:
     """Return the curve's point at a time in the valid span, by repeated interpolation of the active control points."""
     t, x = np.asarray(knots, dtype=np.float64), np.asarray(points, dtype=np.float64)
-    j = spans(t, degree, np.array([time]))
-    return np.asarray(_blossom(t, x, degree, j, [np.array([time])] * degree)[0])
+    j = int(spans(t, degree, np.array([time]))[0])
+    d = x[j - degree : j + 1]
+    for level in range(1, degree + 1):
+        left, right = t[j - degree + level : j + 1], t[j + 1 : j + 1 + degree + 1 - level]
+        share = ((time - left) / (right - left))[:, None]
+        d = (1.0 - share) * d[:-1] + share * d[1:]
+    return np.asarray(d[0])
 
 
 def inserted(knots: ArrayLike, points: ArrayLike, degree: int, time: float) -> tuple[Array, Array]:
@@ -165,7 +164,7 @@ def bspline(points: ArrayLike, knots: ArrayLike, degree: int = 3) -> Trajectory:
     ----------
     C. de Boor, A Practical Guide to Splines, Springer, 1978, chapters IX and X.
     """
-    x = np.asarray(points, dtype=np.float64)
+    x = np.ascontiguousarray(points, dtype=np.float64)
     breaks, bernstein = bezier_pieces(checked_knots(knots, len(x), degree), x, degree)
     return Trajectory.from_bernstein(breaks, bernstein)
 
@@ -174,20 +173,9 @@ def bezier_pieces(knots: Array, points: Array, degree: int) -> tuple[Array, Arra
     """Return the breaks (K + 1,) and the Bézier control points (p + 1, K, D) of the non-empty spans."""
     j = np.arange(degree, len(points))
     j = j[knots[j] < knots[j + 1]]
-    a, b = knots[j], knots[j + 1]
-    pieces = [_blossom(knots, points, degree, j, [b] * i + [a] * (degree - i)) for i in range(degree + 1)]
-    return np.append(a, b[-1]), np.stack(pieces)
-
-
-def _blossom(knots: Array, points: Array, degree: int, j: Indices, at: list[Array]) -> Array:
-    """Return the polar form of the span j's polynomial at ``degree`` arguments: only convex combinations inside it."""
-    d = [points[j - degree + i] for i in range(degree + 1)]
-    for level, t in enumerate(at, start=1):
-        for i in range(degree, level - 1, -1):
-            left, right = knots[j - degree + i], knots[j + 1 + i - level]
-            share = ((t - left) / (right - left))[:, None]
-            d[i] = d[i - 1] + share * (d[i] - d[i - 1])
-    return d[degree]
+    pieces = np.empty((degree + 1, len(j), points.shape[1]))
+    kernel.bezier_points(knots, points, degree, j, pieces)
+    return np.append(knots[j], knots[j[-1] + 1]), pieces
 
 
 def interpolation_knots(times: Array, degree: int) -> Array:
