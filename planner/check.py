@@ -56,7 +56,7 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     spacing = options.spacing if isinstance(options, Spaced) else "centripetal"
     fixed = request.times is not None and can.timing == "given"
     if spacing != "centripetal" and (fixed or can.timing == "chosen"):
-        raise InvalidRequest.of("/options/spacing", "conflict", "times are given: nothing is left to be spread")
+        raise InvalidRequest.of("/options/spacing", "conflict", "the times are known: nothing is left to be spread")
     notes = []
     if request.wrap is not None:
         turned = shortest_turns(request.waypoints, request.wrap)
@@ -76,6 +76,8 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     start, end = (_resolved(request, can, side) for side in ("start", "end"))
     still = not np.ptp(request.waypoints, axis=0).any() and not _moving(start) and not _moving(end)
     still = still and not options.moves_by_itself
+    if still and options.model_fields_set:
+        options.check(request.waypoints)
     if request.times is None and can.timing == "given":
         assert request.duration is not None  # _require saw to it
         if not still:

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from .errors import FieldError, InvalidRequest
@@ -70,6 +72,12 @@ class Options(BaseModel):
     def moves_by_itself(self) -> bool:
         """Whether the options hold a curve, which may move where all waypoints are equal."""
         return False
+
+    def check(self, points: NDArray[np.float64]) -> None:
+        """Raise InvalidRequest where the options do not fit the waypoints (N, D), which are all equal.
+
+        Nothing then moves and the method is not asked; elsewhere it finds out by itself.
+        """
 
     @property
     def control_points(self) -> bool:

@@ -181,6 +181,10 @@ class PathOptions(Options):
         """Whether the path is a curve of its own."""
         return isinstance(self.path, GivenPath) or self.path.moves_by_itself
 
+    def check(self, points: Array) -> None:
+        """Raise InvalidRequest where the path's options do not fit the waypoints."""
+        build_path(self.path, points)
+
     @property
     def control_points(self) -> bool:
         """Whether the waypoints are control points."""

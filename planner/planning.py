@@ -79,6 +79,10 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
         if (reason := beyond_precision(solution.trajectory, asked.request.waypoints)) is not None:
             raise Unsupported(row.id, "precision", reason=reason)
         raise NotVerified(row.id, asdict(judged))
+    promised, found = row.capabilities(chosen).continuity, certificate.continuity
+    if found is not None and found < promised and not asked.still:
+        reason = f"rounding leaves a curve of class C{found} here, {row.id} promises C{promised}: even the times out"
+        raise Unsupported(row.id, "precision", reason=reason)
     done = time.perf_counter()
     inside = solution.stats.seconds  # 0: the method has no solver to tell apart, all of it is solving
     pose = max(solved - checked - inside, 0.0) if inside else 0.0

@@ -13,7 +13,8 @@ _FINE = np.concatenate([[0.0], _INNER[0], [1.0]]), np.concatenate([[0.0], _INNER
 #: Where a function falls to this part of its largest value inside an interval it may have a kink.
 LOW = 0.05
 
-MOST_PIECES = 1 << 16
+#: Intervals looked at together, and in all.
+MOST_PIECES, MOST_IN_ALL = 1 << 16, 1 << 18
 
 
 def integral(function: Callable[[NDArray[np.int64], Array], Array], pieces: int, noise: Array) -> float:
@@ -28,7 +29,7 @@ def integral(function: Callable[[NDArray[np.int64], Array], Array], pieces: int,
         By how much rounding lets a piece's integral differ.
     """
     piece, left, width = np.arange(pieces), np.zeros(pieces), np.ones(pieces)
-    total = 0.0
+    total, seen = 0.0, 0
     for _ in range(48):
         coarse, fine = (function(piece, left[:, None] + width[:, None] * u) for u, _ in (_COARSE, _FINE))
         a, b = width * (coarse @ _COARSE[1]), width * (fine @ _FINE[1])
@@ -38,7 +39,10 @@ def integral(function: Callable[[NDArray[np.int64], Array], Array], pieces: int,
         total += float(b[~rough].sum())
         if not rough.any():
             return total
-        if rough.sum() > MOST_PIECES:  # rounding, or kinks without end: what there is, is good enough
+        seen += len(piece)
+        if rough.sum() > MOST_PIECES or seen > max(
+            MOST_IN_ALL, 8 * pieces
+        ):  # rounding, or kinks without end: what there is, is good enough
             break
         piece, half = np.repeat(piece[rough], 2), 0.5 * width[rough]
         left = np.stack([left[rough], left[rough] + half], axis=1).reshape(-1)

@@ -4,12 +4,12 @@ A quotient of polynomials lies between the least and the largest quotient of the
 those of the denominator are positive; halving an interval makes these bounds four times as tight.
 """
 
-from math import comb
+from math import comb, perm, prod
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .pieces import differentiated, halved, product, raised, value
+from .pieces import differentiated, halved, product, raised, to_bernstein, value
 from .quadrature import integral
 
 Array = NDArray[np.float64]
@@ -19,6 +19,8 @@ TIGHT = 1e-10
 #: Pieces are first halved until their denominator varies by no more than this factor.
 EVEN, MOST_HALVINGS = 2.0, 12
 MOST_LEVELS, MOST_INTERVALS = 40, 1 << 15
+#: Numbers held at a time, about.
+BLOCK = 1 << 20
 
 
 def quotient(numerator: Array, denominator: Array) -> Array:
@@ -58,15 +60,13 @@ def derivative(a: Array, w: Array, order: int) -> tuple[Array, Array]:
     return raised(a, len(bottom) - 1), bottom
 
 
-def enclosures(
-    a: Array, w: Array, scale: Array, group: NDArray[np.int64] | None = None
-) -> tuple[Array, Array, Array, Array]:
+def enclosures(whole: Array, scale: Array, group: NDArray[np.int64] | None = None) -> tuple[Array, Array, Array, Array]:
     """Return bounds of the derivatives of A / W on every piece, and where they are (almost) taken.
 
     Parameters
     ----------
-    a, w : (n + 1, K, D), (n + 1, K)
-        Bernstein coefficients; the denominator is positive.
+    whole : (n + 1, K, D + 1)
+        Monomial coefficients, highest power first; the last joint is the denominator, which is positive.
     scale : (R, K)
         Factor of each order's u-derivative: 1 / duration^m.
     group : (K,)
@@ -76,10 +76,30 @@ def enclosures(
     -------
     low, at_low, high, at_high : (R, K, D)
         No value lies outside; over each group's pieces the largest and the smallest are tight to 1e-10 of the larger
-        magnitude. The places are values of u.
+        magnitude, or to what rounding of the coefficients leaves of them. The places are values of u.
     """
-    pieces = a.shape[1]
+    size, pieces, dims = whole.shape
     group = np.zeros(pieces, dtype=np.int64) if group is None else group
+    best = np.full((2, len(scale), int(group.max()) + 1, dims - 1), np.inf)  # of the least and of minus the largest
+    rows = [differentiated(whole, m) for m in range(len(scale))]
+    for at in (np.stack([r[-1] for r in rows]), np.stack([r.sum(axis=0) for r in rows])):
+        ends = quotient(at[..., :-1], at[..., -1]) * scale[:, :, None]
+        for m in range(len(scale)):
+            np.minimum.at(best[0, m], group, ends[m])
+            np.minimum.at(best[1, m], group, -ends[m])
+    step = max(1, BLOCK // (4 * size * dims))
+    parts = [
+        _block(whole[:, k : k + step], scale[:, k : k + step], group[k : k + step], best)
+        for k in range(0, pieces, step)
+    ]
+    low, at_low, high, at_high = (np.concatenate(x, axis=1) for x in zip(*parts, strict=True))
+    return low, at_low, high, at_high
+
+
+def _block(whole: Array, scale: Array, group: NDArray[np.int64], best: Array) -> tuple[Array, Array, Array, Array]:
+    pieces, coarse = whole.shape[1], np.abs(whole).sum(axis=0)
+    bernstein = to_bernstein(whole)
+    a, w = bernstein[..., :-1], bernstein[..., -1]
     piece, left, width = np.arange(pieces), np.zeros(pieces), np.ones(pieces)
     for _ in range(MOST_HALVINGS):
         uneven = (w.max(axis=0) > EVEN * w.min(axis=0)) | (w.min(axis=0) <= 0)
@@ -89,19 +109,21 @@ def enclosures(
         piece, left, width = _split_places(piece, left, width, uneven)
     anchor = a[0] / w[0][:, None]
     numerator, bottom = a - anchor * w[:, :, None], w
-    out = []
-    for m, factor in enumerate(scale[:, piece] / width ** np.arange(len(scale))[:, None]):
+    reach = np.abs(a / w[:, :, None]).max(axis=0)
+    rounding = 2 * np.finfo(float).eps * (coarse[piece, :-1] + reach * coarse[piece, -1:]) / w.min(axis=0)[:, None]
+    noises, out = _noises(rounding, w, width, len(scale)), []
+    for m, factor in enumerate(scale[:, piece]):
         if m > 0:  # (N / W^m)' = (N' W - m N W') / W^(m+1), kept near zero by the anchor
             numerator = _times(_derivative(numerator), w) - m * _times(numerator, _derivative(w))
             bottom = _times(bottom[:, :, None], w)[:, :, 0]
-        top = _elevated(numerator, len(bottom) - 1) * factor[:, None]
+        top = _elevated(numerator, len(bottom) - 1) * (factor / width**m)[:, None]
         shift = anchor if m == 0 else np.zeros_like(anchor)
-        out.append(_enclosed(top, bottom, shift, (piece, left, width), group))
+        out.append(_enclosed(top, bottom, shift, noises[m] * factor[:, None], (piece, left, width), group, best[:, m]))
     low, at_low, high, at_high = (np.stack(x) for x in zip(*out, strict=True))
     return low, at_low, high, at_high
 
 
-def squared_integral(whole: Array, rate: Array, order: int, largest: float) -> float:
+def squared_integral(whole: Array, rate: Array, order: int) -> float:
     """Return the integral of the squared Euclidean norm of a derivative, by quadrature to about 1e-10.
 
     Parameters
@@ -110,8 +132,6 @@ def squared_integral(whole: Array, rate: Array, order: int, largest: float) -> f
         Monomial coefficients, highest power first, the denominator's last.
     rate : (K,)
         1 / duration of each piece.
-    largest : float
-        Of the squared norm, for what rounding may do.
     """
     if not rate.any():
         return 0.0
@@ -122,29 +142,64 @@ def squared_integral(whole: Array, rate: Array, order: int, largest: float) -> f
         norm = (quotient(found[..., :-1], found[..., -1])[order] ** 2).sum(axis=-1)
         return np.asarray(norm * rate[piece, None] ** (2 * order - 1))
 
-    return integral(squared, whole.shape[1], 1e-12 * largest / rate)
+    pieces = np.arange(whole.shape[1])
+    typical = np.sqrt(squared(pieces, np.broadcast_to(np.linspace(0, 1, 17), (len(pieces), 17))).mean(axis=1))
+    off = noise_of(whole, order) * rate ** (order - 0.5)
+    return integral(squared, whole.shape[1], 2 * typical * off + off**2)
+
+
+def noise_of(whole: Array, order: int) -> Array:
+    """Return about how much rounding moves a u-derivative on each piece, (K,): no bound, but where to stop refining."""
+    n, size = len(whole) - 1, np.abs(whole).sum(axis=0)
+    most = size[:, :-1].max(axis=1) / np.maximum(whole[-1, :, -1], whole[:, :, -1].sum(axis=0))
+    return np.asarray(_markov(n, order) * np.finfo(float).eps * most)
+
+
+def _noises(rounding: Array, w: Array, width: Array, orders: int) -> list[Array]:
+    """Return how far an error e = E / W of size ``rounding`` (I, D) may move the u-derivatives of a quotient.
+
+    E is a polynomial on the whole piece, so Markov's inequality bounds its derivatives; then
+    |e^(m)| <= |E^(m)| / W + sum_j C(m, j) |W^(j)| / W |e^(m-j)|, with W^(j) from the Bernstein coefficients (n + 1, I).
+    """
+    n, spread = len(w) - 1, (w.max(axis=0) - w.min(axis=0)) / w.min(axis=0)
+    out = [rounding]
+    for m in range(1, orders):
+        worst = _markov(n, m) * rounding
+        for j in range(1, min(m, n) + 1):
+            slope = perm(n, j) * 2.0 ** (j - 1) * spread / width**j
+            worst = worst + comb(m, j) * slope[:, None] * out[m - j]
+        out.append(worst)
+    return out
+
+
+def _markov(n: int, order: int) -> float:
+    """Return the largest derivative on [0, 1] of a polynomial of degree n that stays within ±1 there."""
+    return prod(2.0 * (n * n - j * j) / (2 * j + 1) for j in range(order)) if order <= n else 0.0
 
 
 Places = tuple[NDArray[np.int64], Array, Array]
 
 
 def _enclosed(
-    top: Array, bottom: Array, shift: Array, places: Places, group: NDArray[np.int64]
+    top: Array, bottom: Array, shift: Array, noise: Array, places: Places, group: NDArray[np.int64], best: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Return low, at_low, high, at_high (K, D) of shift + top / bottom, by halving where the largest may be."""
+    """Return low, at_low, high, at_high (K, D) of shift + top / bottom, by halving where the largest may be.
+
+    ``noise`` (I, D) is added on both sides; ``best`` (2, G, D), the least and minus the largest value known to be
+    taken in each group, is kept up to date.
+    """
     piece, left, width = places
-    noise = 16 * np.finfo(float).eps * len(top) * np.abs(top).max(axis=0) / bottom.min(axis=0)[:, None]
-    best_low = np.full((int(group.max()) + 1, top.shape[2]), np.inf)
-    best_high, pieces, found = -best_low, len(group), []
+    noise = noise + 16 * np.finfo(float).eps * len(top) * np.abs(top).max(axis=0) / bottom.min(axis=0)[:, None]
+    pieces, found = len(group), []
     for level in range(MOST_LEVELS):
         ratio = top / bottom[:, :, None]
         least, most = ratio.min(axis=0) + shift - noise, ratio.max(axis=0) + shift + noise
         ends = ratio[[0, -1]] + shift  # values that are taken
         mine = group[piece]
-        np.minimum.at(best_low, mine, ends.min(axis=0))
-        np.maximum.at(best_high, mine, ends.max(axis=0))
-        slack = TIGHT * np.maximum(np.abs(best_low), np.abs(best_high))[mine] + 4 * noise
-        wide = ((most > best_high[mine] + slack) | (least < best_low[mine] - slack)).any(axis=1)
+        np.minimum.at(best[0], mine, ends.min(axis=0))
+        np.minimum.at(best[1], mine, -ends.max(axis=0))
+        slack = TIGHT * np.abs(best).max(axis=0)[mine] + 4 * noise
+        wide = ((most > slack - best[1][mine]) | (least < best[0][mine] - slack)).any(axis=1)
         if level == MOST_LEVELS - 1 or wide.sum() > MOST_INTERVALS:  # what is known holds, only less tightly
             wide[:] = False
         found.append((piece[~wide], left[~wide], (left + width)[~wide], least[~wide], most[~wide], *ends[:, ~wide]))

@@ -292,8 +292,7 @@ class Trajectory:
         scale = self.rates ** np.arange(orders)[:, None]
         h, t = np.diff(self.breaks)[:, None], self.breaks[:-1, None]
         if self.rational:
-            bernstein = arithmetic.to_bernstein(self._homogeneous)
-            low, at_low, high, at_high = enclosures(bernstein[..., :-1], bernstein[..., -1], scale, group)
+            low, at_low, high, at_high = enclosures(self._homogeneous, scale, group)
         else:
             low, at_low, high, at_high = extrema(self.coefficients, orders)
             low, high = low * scale[:, :, None], high * scale[:, :, None]
@@ -305,8 +304,7 @@ class Trajectory:
         For rational pieces: by quadrature, to about 1e-10.
         """
         if self.rational:
-            peak = self.extrema(order + 1).peak(order) if self.duration else np.zeros(self.dims)
-            return squared_integral(self._homogeneous, self.rates, order, float((peak**2).sum()))
+            return squared_integral(self._homogeneous, self.rates, order)
         if order > self.degree:
             return 0.0
         c = arithmetic.differentiated(self.coefficients, order)

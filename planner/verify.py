@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .jumps import counted_jumps
 from .limits import QUANTITIES, Boundary, DurationBounds, Limit, magnitude, segment_bounds
 from .quadrature import integral
+from .rational import noise_of
 from .trajectory import Trajectory
 from .types import Certificate, Check, Demands, Followed
 from .worst import TIE, Worst, measures, peaks, worst
@@ -50,7 +51,7 @@ def verify(
     motion = _measure(inner, demands, at)
     checks = _limit_rows(motion)
     checks += _duration_rows(trajectory, demands, at)
-    waypoint_error = _waypoint_error(trajectory, demands, at, motion.span)
+    waypoint_error = _waypoint_error(inner, demands, at, motion.span)
     boundary_error = _boundary_error(motion)
     deviation = None if path is None else _path_deviation(trajectory, path)
     errors = [
@@ -220,6 +221,7 @@ def _duration_row(quantity: str, value: float, bounds: DurationBounds, segment: 
 
 
 def _waypoint_error(trajectory: Trajectory, demands: Demands, at: Array | None, span: float) -> float | None:
+    """Return the largest miss of a waypoint from either side, for a trajectory with breaks at the times."""
     if demands.waypoints is None or at is None:
         return None
     slack = 1e-9 * max(1.0, trajectory.duration)
@@ -227,7 +229,13 @@ def _waypoint_error(trajectory: Trajectory, demands: Demands, at: Array | None, 
     if len(at) != len(demands.waypoints) or not inside.all() or (np.diff(at) < 0).any():
         return float("inf")
     reached = trajectory(np.clip(at, trajectory.start, trajectory.end))
-    return float(np.abs(reached - demands.waypoints).max() / span)
+    off = np.abs(reached - demands.waypoints)
+    before = np.searchsorted(trajectory.breaks, at) - 1  # the piece that ends there, if one does
+    ends = (before >= 0) & (trajectory.breaks[np.minimum(before + 1, trajectory.pieces)] == at)
+    if ends.any():
+        missed = np.abs(trajectory.ends(0)[1][before[ends]] - demands.waypoints[ends])
+        off[ends] = np.maximum(off[ends], missed)
+    return float(off.max() / span)
 
 
 def _boundary_error(motion: _Motion) -> float | None:
@@ -273,7 +281,7 @@ def path_length(trajectory: Trajectory) -> float:
     slopes = trajectory.coefficients[:-1] * np.arange(trajectory.degree, 0, -1.0)[:, None, None]  # d/du
     noise = 64 * np.finfo(float).eps * np.sqrt((np.abs(slopes).sum(axis=0) ** 2).sum(axis=1))
     if trajectory.rational:
-        return _rational_length(trajectory, noise)
+        return _rational_length(trajectory)
     from .kernels.speed import speeds
 
     def speed(piece: NDArray[np.int64], u: Array) -> Array:
@@ -284,7 +292,9 @@ def path_length(trajectory: Trajectory) -> float:
     return integral(speed, trajectory.pieces, noise)
 
 
-def _rational_length(trajectory: Trajectory, noise: Array) -> float:
+def _rational_length(trajectory: Trajectory) -> float:
+    assert trajectory.weights is not None
+    noise = noise_of(np.concatenate([trajectory.coefficients, trajectory.weights[:, :, None]], axis=2), 1)
     h = np.diff(trajectory.breaks)
 
     def speed(piece: NDArray[np.int64], u: Array) -> Array:

@@ -40,6 +40,15 @@ class BsplineOptions(Spaced):
         """Whether the clock is the options'."""
         return self.control_points and self.knots is not None
 
+    def check(self, points: Array) -> None:
+        """Raise InvalidRequest where degree or knots do not fit the points."""
+        if self.interpolate:
+            check_degree(len(points), self.degree)
+            if self.knots is not None:
+                checked_knots(self.knots, len(points), self.degree)
+        else:
+            by_control_points(self, points, None)
+
     @property
     def control_points(self) -> bool:
         """Whether the waypoints are control points."""

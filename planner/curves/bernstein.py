@@ -47,6 +47,10 @@ class BezierOptions(Options):
         """Whether the clock is the options'."""
         return self.knots is not None
 
+    def check(self, points: Array) -> None:
+        """Raise InvalidRequest where the points do not make whole segments."""
+        from_options(self, points, None)
+
     @property
     def control_points(self) -> bool:
         """Whether the waypoints are control points."""

@@ -40,6 +40,10 @@ class CubicSplineOptions(Spaced):
         "pieces, start_conditions takes velocity and acceleration at the start; or a pair [start, end].",
     )
 
+    def check(self, points: Array) -> None:
+        """Raise InvalidRequest where the boundary needs more points."""
+        cubic_spline(np.arange(len(points)), points, self.boundary)
+
 
 def ends_of(boundary: Any) -> tuple[str, str]:
     """Return the boundary kind at the start and at the end."""

@@ -70,10 +70,11 @@ def newton_trajectory(nodes: Array, values: Array, slopes: Array | None, start: 
     taylor = np.zeros((min(degree, TERMS) + 1, pieces, values.shape[1]))  # lowest power first
     taylor[0] = newton[-1]
     for k in range(degree - 1, -1, -1):  # Horner with a linear factor: a_k + (left + width u - z_k) (…)
-        shifted = (left - z[k]) * taylor
-        shifted[1:] += width * taylor[:-1]
+        size = min(degree - k, TERMS) + 1  # further terms are zero as yet
+        shifted = (left - z[k]) * taylor[:size]
+        shifted[1:] += width * taylor[: size - 1]
         shifted[0] += newton[k]
-        taylor = shifted
+        taylor[:size] = shifted
     return Trajectory(breaks, trimmed(taylor[::-1]))
 
 

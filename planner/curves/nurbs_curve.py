@@ -37,6 +37,10 @@ class NurbsOptions(Options):
         """Whether the clock is the options'."""
         return self.knots is not None
 
+    def check(self, points: Array) -> None:
+        """Raise InvalidRequest where degree, knots or weights do not fit the points."""
+        from_options(self, points, None)
+
     @property
     def control_points(self) -> bool:
         """Whether the waypoints are control points."""

@@ -20,7 +20,7 @@ def _drop_stale() -> None:
             compiled.unlink(missing_ok=True)
         cache.mkdir(exist_ok=True)
         stamp.write_text(now)
-    except OSError:  # a folder that cannot be written to has no compiled kernels either
+    except OSError:  # a folder that cannot be written to: then Numba keeps its files elsewhere, by this folder's path
         return
 
 

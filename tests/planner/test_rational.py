@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner import InvalidRequest, Trajectory, certify
-from planner.curves import nurbs
+from planner import InvalidRequest, PlanRequest, Trajectory, certify, plan
+from planner.curves import clamped_knots, nurbs
 from planner.curves.basis import bezier_pieces
 from planner.types import Demands
 from planner.verify import path_length, verify
@@ -155,7 +155,10 @@ def largest(curve, order, joint, sign):
 
 @given(SEEDS)
 def test_extrema_are_tight(seed):
-    """Over all pieces the bounds exceed what a search finds by no more than 1e-8 of the larger magnitude."""
+    """Over all pieces the bounds exceed what a search finds by no more than 1e-8 of the larger magnitude.
+
+    1e-6 for the second and third derivative, of which the rounding of high degrees leaves no more.
+    """
     _, curve, _, _ = random_nurbs(seed)
     found = curve.extrema(4)
     for order in range(4):
@@ -163,7 +166,7 @@ def test_extrema_are_tight(seed):
             size = found.peak(order)[joint]
             for bound, sign in ((found.high[order, :, joint].max(), 1), (-found.low[order, :, joint].min(), -1)):
                 reached = largest(curve, order, joint, sign)
-                assert reached - 1e-10 * size <= bound <= reached + 1e-8 * size
+                assert reached - 1e-10 * size <= bound <= reached + (1e-8 if order < 2 else 1e-6) * size
 
 
 @given(SEEDS)
@@ -436,3 +439,41 @@ def test_pieces_come_from_the_homogeneous_blossom():
     assert (curve.breaks == breaks).all()
     mine = curve.weights[0] * u**2 + curve.weights[1] * u + curve.weights[2]
     assert mine == pytest.approx(value[:, 0] / max(weights), abs=1e-15)
+
+
+def exact_velocity(curve, piece, u):
+    """The velocity in fractions, from the coefficients as they are."""
+    a = [Fraction(float(c)) for c in curve.coefficients[:, piece, 0]]
+    w = [Fraction(float(c)) for c in curve.weights[:, piece]]
+    n = len(a) - 1
+
+    def at(c):
+        return sum(x * u ** (n - k) for k, x in enumerate(c))
+
+    def slope(c):
+        return sum((n - k) * x * u ** (n - k - 1) for k, x in enumerate(c[:-1]))
+
+    rate = (slope(a) * at(w) - at(a) * slope(w)) / at(w) ** 2
+    return float(rate) / float(np.diff(curve.breaks)[piece])
+
+
+@pytest.mark.parametrize(("offset", "move"), [(0, 1), (1e3, 1), (1e6, 1e-3), (1e6, 1e-5), (1e8, 1)])
+def test_an_offset_does_not_hide_a_broken_limit(offset, move):
+    """Far from the origin the coefficients' own rounding moves the curve: the bounds must cover what they say."""
+    points = [[offset + move * v] for v in (-0.7, -0.5, 0.2, -0.4, 0.1)]
+    option = {"path": {"kind": "nurbs", "degree": 4, "weights": [59, 98, 2, 1293, 10]}}
+    done = plan(PlanRequest.of(points, limits={"velocity": 1.0}), "time_scaled", option)
+    curve = done.trajectory
+    for piece in range(curve.pieces):
+        for k in range(0, 401):
+            assert abs(exact_velocity(curve, piece, Fraction(k, 400))) <= 1 + 1e-6
+    assert done.certificate.checks[0].ratio <= 1 + 1e-9
+
+
+def test_a_curve_far_from_the_origin_takes_no_longer():
+    rng = np.random.default_rng(3)
+    points = 1e6 + rng.normal(size=(8, 3))
+    curve = nurbs(points, [0.0155, 1, 7, 0.3, 62, 2, 0.5, 1], clamped_knots(8, 7), 7)
+    near = nurbs(points - 1e6, [0.0155, 1, 7, 0.3, 62, 2, 0.5, 1], clamped_knots(8, 7), 7)
+    assert curve.squared_integral(3) == pytest.approx(near.squared_integral(3), rel=1e-3)
+    assert path_length(curve) == pytest.approx(path_length(near), rel=1e-6)

@@ -3,7 +3,19 @@
 import numpy as np
 import pytest
 
-from planner import Infeasible, PlannerError, PlanRequest, Trajectory, Unsupported, certify, compare, plan
+from planner import (
+    Infeasible,
+    InvalidRequest,
+    PlannerError,
+    PlanRequest,
+    Trajectory,
+    Unsupported,
+    certify,
+    compare,
+    plan,
+)
+from planner.types import Demands
+from planner.verify import verify
 
 
 def test_ruckig_with_jerk_limits_on_some_joints():
@@ -284,3 +296,56 @@ def test_steps_of_a_microsecond_on_a_clock_of_days():
         assert plan(request, "time_scaled").certificate.holds
     except Unsupported as refusal:
         assert refusal.what == "precision"
+
+
+# -- curves ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_septic_through_very_uneven_times_is_refused_or_keeps_its_class():
+    """The coefficients reach 1e9, and the pieces no longer meet: it had been answered as of class -1."""
+    times = [0.0, 0.00204, 0.977512, 1.069224, 1.09351, 1.143439, 1.144646, 1.149897]
+    points = [[-1.117], [0.666], [0.292], [-0.946], [0.529], [1.519], [-1.282], [0.061]]
+    with pytest.raises(Unsupported, match="precision|rounding"):
+        plan(PlanRequest.of(points, times=times), "septic_spline")
+
+
+def test_a_waypoint_missed_from_the_left_is_missed():
+    left, right = Trajectory.hold([0.0], 0.0, 1.0), Trajectory.hold([1e-5], 1.0, 2.0)
+    found = verify(
+        Trajectory.concatenate([left, right]), Demands(dims=1, waypoints=np.array([[1e-5]]), times=np.array([1.0]))
+    )
+    assert found.waypoint_error == pytest.approx(1e-5) and not found.holds
+
+
+@pytest.mark.parametrize(
+    ("method", "options", "code"),
+    [
+        ("nurbs", {"weights": [1, -1, 1, 1, 1]}, "bad_weights"),
+        ("nurbs", {"degree": 99}, "bad_degree"),
+        ("bspline", {"interpolate": False, "knots": [3, 2, 1]}, "bad_knots"),
+        ("bezier", {"degree": 3}, "bad_degree"),
+        ("time_scaled", {"path": {"kind": "nurbs", "degree": 77}}, "bad_degree"),
+    ],
+)
+def test_options_count_where_nothing_moves(method, options, code):
+    with pytest.raises(InvalidRequest) as caught:
+        plan(
+            PlanRequest.of([[1, 1]] * 5, limits={"velocity": 1.0} if method == "time_scaled" else None), method, options
+        )
+    assert caught.value.errors[0].code == code
+
+
+def test_pieces_of_a_polynomial_leave_no_sliver_beside_a_waypoint():
+    """A break that nearly met a waypoint left a piece of 3e-15 s, which was refused as beyond double precision."""
+    points = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]]
+    done = plan(PlanRequest.of(points, limits={"velocity": 1.0}), "time_scaled", {"path": {"kind": "polynomial"}})
+    assert done.certificate.holds and np.diff(done.trajectory.breaks).min() > 1e-3
+
+
+def test_the_limit_that_binds_is_always_named():
+    """(least * span) / span may differ from least in the last bit: then nothing was said."""
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        points, times = rng.normal(size=(4, 1)), np.cumsum(rng.uniform(0.3, 1, 4))
+        done = plan(PlanRequest.of(points, times=times, limits={"velocity": 0.1}), "time_scaled")
+        assert [n.code for n in done.notes] == ["binding_limit"]
