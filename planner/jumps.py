@@ -37,5 +37,7 @@ def counted_jumps(trajectory: Trajectory, order: int, peak: Array, span: float =
     tick = eps * np.abs(trajectory.breaks[1:-1, None])  # what the clock cannot tell moves a break, and scales pieces
     peaks, rates = (np.maximum(np.abs(a[1:]), np.abs(b[:-1])) for a, b in ((here, there), trajectory.ends(order + 1)))
     clock = tick * rates + order * tick / np.minimum(h[1:], h[:-1]) * peaks
-    allowed = np.maximum(rounding[1:], rounding[:-1]) + np.minimum(clock, 1e-2 * peak)
+    stand = 8 * eps * position / h**order  # where it stands is rounded too; that may hide no large jump
+    stand = np.minimum(np.maximum(stand[1:], stand[:-1]), 1e-3 * peak)
+    allowed = np.maximum(rounding[1:], rounding[:-1]) + np.minimum(clock, 1e-2 * peak) + stand
     return np.asarray(jumps > JUMP * peak + allowed)
