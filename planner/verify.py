@@ -137,17 +137,15 @@ def _continuity(trajectory: Trajectory, span: float) -> int | None:
 def _limit_rows(motion: _Motion) -> list[Check]:
     """Return a row for every limited quantity: the worst joint, segment and time."""
     demands = motion.demands
-    segments = int(motion.segment.max()) + 1 if demands.segment_limits is None else len(demands.segment_limits)
-    if demands.segment_limits is None:
-        segments = 1
+    segments = 1 if demands.segment_limits is None else len(demands.segment_limits)
+    row = np.minimum(motion.segment, segments - 1)
     each = [
         segment_bounds(demands.limits, demands.segment_limits, m, segments, demands.dims)
         for m in range(len(QUANTITIES))
     ]
-    limited = [bool((np.isfinite(x.lower) | np.isfinite(x.upper)).any()) for x in each]
+    limited = [bool((np.isfinite(x.lower[row]) | np.isfinite(x.upper[row])).any()) for x in each]
     if not any(limited):
         return []
-    row = motion.segment if demands.segment_limits is not None else np.zeros_like(motion.segment)
     lower, upper = np.stack([x.lower for x in each]), np.stack([x.upper for x in each])  # (4, S, D)
     scale = np.stack([magnitude(x.lower, x.upper) for x in each])
     distance, ratio = measures(lower, upper, scale), measures(lower, upper, None)
@@ -175,9 +173,9 @@ def _limit_row(motion: _Motion, limit: Limit, row: NDArray[np.int64], order: int
             side = upper[piece, joint] if np.isfinite(upper[piece, joint]) else lower[piece, joint]
             time, segment = float(motion.trajectory.breaks[piece + 1]), int(motion.segment[piece])
             return Check(quantity, joint, segment, time, None, _finite(side), None, False)
-    if not np.isfinite(motion.peaks[order]).all():
-        return Check(quantity, None, None, None, None, None, None, False)
     badness, most = found.badness[order], float(found.most[order].max())
+    if not (np.isfinite(motion.peaks[order]).all() and np.isfinite(most)):  # beyond floating point: nothing is held
+        return Check(quantity, None, None, None, None, None, None, False)
     ties = np.flatnonzero(badness >= most - TIE * abs(most))  # the earliest, whatever rounding prefers
     joint = int(ties[np.argmin(found.time[order, ties])])
     piece, value = int(found.piece[order, joint]), float(found.value[order, joint])
