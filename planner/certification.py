@@ -302,15 +302,16 @@ def _sampled_boundary(recorded: Recorded, demands: Demands, differences: list[tu
 def _end_derivative(recorded: Recorded, order: int, index: int) -> tuple[Array, Array]:
     """Return a derivative at the first (0) or last (-1) sample, (D,), and to what it is known.
 
-    From the polynomial through the outer order + 3 samples; what it changes when it takes one sample less is what is
-    not known.
+    From the polynomial through the outer order + 4 samples; what it changes when it takes fewer is not known, nor what
+    noise of 4e-9 of the range, or the record's own roughness, may make of it.
     """
     t = recorded.time if index == 0 else recorded.time[::-1]
     q = recorded.position if index == 0 else recorded.position[::-1]
     found = []
-    for count in (min(order + 3, len(t)), min(order + 2, len(t))):
+    for count in range(min(order + 2, len(t)), min(order + 4, len(t)) + 1):
         unit = abs(t[count - 1] - t[0])
         powers = np.vander((t[:count] - t[0]) / unit, increasing=True)
         found.append(np.linalg.solve(powers, q[:count])[order] * math.factorial(order) / unit**order)
-    noise = 1e-15 * float(np.abs(q).max()) / float(np.abs(np.diff(t[: order + 2])).min()) ** order
-    return found[0], 2.0 * np.abs(found[0] - found[1]) + noise
+    rough = np.median(np.abs(np.diff(q, n=4, axis=0)), axis=0) if len(t) > 8 else 0.0  # noise, or what dt hides
+    noise = (4e-9 * position_span(q) + 2.0 * rough) * (4.0 / float(np.abs(np.diff(t[: order + 4])).min())) ** order
+    return found[-1], 2.0 * np.ptp(np.stack(found), axis=0) + noise

@@ -140,7 +140,11 @@ def _require(request: PlanRequest, can: Capabilities) -> None:
             continue
         limit = getattr(request.limits, quantity)
         if limit is None:
-            raise InvalidRequest.of(f"/limits/{quantity}", "missing", f"the method needs a {quantity} limit")
+            raise InvalidRequest.of(
+                f"/limits/{quantity}",
+                "missing",
+                f"the method needs {'an' if quantity == 'acceleration' else 'a'} {quantity} limit",
+            )
         lacking = moving & ~(np.isfinite(limit.lower) & np.isfinite(limit.upper))
         if lacking.any():
             reason = f"joint {int(np.argmax(lacking))} moves, so its {quantity} must be limited on both sides"

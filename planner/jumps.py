@@ -12,6 +12,27 @@ Array = NDArray[np.float64]
 JUMP = 1e-6
 
 
+#: By how much a curve's rounding may grow from one derivative to the next, in units of the step.
+GROWTH = 16.0
+
+
+def smoothness_lost(trajectory: Trajectory, order: int, peak: Array, span: float = 1.0) -> bool:
+    """Return whether a derivative jumps by more than rounding explains: what a curve's class is judged by.
+
+    More lenient than ``counted_jumps``, by which limits are judged: where a derivative is nothing but rounding (that of
+    a straight line, say) its jumps do not count, however the curve was computed; not so in pieces much shorter than
+    their neighbours, which could hide anything.
+    """
+    counted = counted_jumps(trajectory, order, peak, span)
+    if order == 0 or not counted.any():
+        return bool(counted.any())
+    left, right = trajectory.ends(order)
+    h = np.diff(trajectory.breaks)[:, None]
+    size = np.abs(np.concatenate(trajectory.ends(0))).max(axis=0)
+    noise = 64 * np.finfo(float).eps * GROWTH**order * size / np.maximum(h[1:], h[:-1]) ** order
+    return bool((counted & (np.abs(left[1:] - right[:-1]) > noise)).any())
+
+
 def counted_jumps(trajectory: Trajectory, order: int, peak: Array, span: float = 1.0) -> NDArray[np.bool_]:
     """Return which jumps of a derivative at the interior breaks count, shape (K - 1, D).
 

@@ -13,11 +13,13 @@ _FINE = np.concatenate([[0.0], _INNER[0], [1.0]]), np.concatenate([[0.0], _INNER
 #: Where a function falls to this part of its largest value inside an interval it may have a kink.
 LOW = 0.05
 
-#: Intervals looked at together, and in all.
-MOST_PIECES, MOST_IN_ALL = 1 << 16, 1 << 18
+#: Intervals looked at together.
+MOST_PIECES = 1 << 16
 
 
-def integral(function: Callable[[NDArray[np.int64], Array], Array], pieces: int, noise: Array) -> float:
+def integral(
+    function: Callable[[NDArray[np.int64], Array], Array], pieces: int, noise: Array, most: int = 1 << 18
+) -> float:
     """Return the sum over the pieces of the integral of a non-negative function over u in [0, 1], to about 1e-10.
 
     Parameters
@@ -27,6 +29,8 @@ def integral(function: Callable[[NDArray[np.int64], Array], Array], pieces: int,
     pieces : int
     noise : (K,)
         By how much rounding lets a piece's integral differ.
+    most : int
+        Intervals looked at in all, or 8 for every piece, before what is found has to do.
     """
     piece, left, width = np.arange(pieces), np.zeros(pieces), np.ones(pieces)
     total, seen = 0.0, 0
@@ -40,9 +44,7 @@ def integral(function: Callable[[NDArray[np.int64], Array], Array], pieces: int,
         if not rough.any():
             return total
         seen += len(piece)
-        if rough.sum() > MOST_PIECES or seen > max(
-            MOST_IN_ALL, 8 * pieces
-        ):  # rounding, or kinks without end: what there is, is good enough
+        if rough.sum() > MOST_PIECES or seen > max(most, 8 * pieces):  # rounding, or kinks without end
             break
         piece, half = np.repeat(piece[rough], 2), 0.5 * width[rough]
         left = np.stack([left[rough], left[rough] + half], axis=1).reshape(-1)

@@ -124,7 +124,7 @@ def _block(whole: Array, scale: Array, group: NDArray[np.int64], best: Array) ->
 
 
 def squared_integral(whole: Array, rate: Array, order: int) -> float:
-    """Return the integral of the squared Euclidean norm of a derivative, by quadrature to about 1e-10.
+    """Return the integral of the squared Euclidean norm of a derivative, by quadrature to about 1e-7.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def squared_integral(whole: Array, rate: Array, order: int) -> float:
     pieces = np.arange(whole.shape[1])
     typical = np.sqrt(squared(pieces, np.broadcast_to(np.linspace(0, 1, 17), (len(pieces), 17))).mean(axis=1))
     off = noise_of(whole, order) * rate ** (order - 0.5)
-    return integral(squared, whole.shape[1], 2 * typical * off + off**2)
+    return integral(squared, whole.shape[1], 2 * typical * off + off**2, 1 << 13)
 
 
 def noise_of(whole: Array, order: int) -> Array:

@@ -301,7 +301,7 @@ class Trajectory:
     def squared_integral(self, order: int) -> float:
         """Return the integral of the squared Euclidean norm of a derivative, exact but for rounding.
 
-        For rational pieces: by quadrature, to about 1e-10.
+        For rational pieces: by quadrature, to about 1e-7.
         """
         if self.rational:
             return squared_integral(self._homogeneous, self.rates, order)

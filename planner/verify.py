@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .jumps import counted_jumps
+from .jumps import counted_jumps, smoothness_lost
 from .limits import QUANTITIES, Boundary, DurationBounds, Limit, magnitude, segment_bounds
 from .quadrature import integral
 from .rational import noise_of
@@ -129,7 +129,7 @@ def _continuity(trajectory: Trajectory, span: float) -> int | None:
         ends = (np.abs(trajectory.ends(m)) for m in range(trajectory.degree + 1))
         highest = [e.max(axis=(0, 1)) for e in ends]
     for order, peak in enumerate(highest):
-        if counted_jumps(trajectory, order, peak, span).any():
+        if smoothness_lost(trajectory, order, peak, span):
             return order - 1
     return trajectory.degree if trajectory.rational else None
 

@@ -47,7 +47,7 @@ class NurbsOptions(Options):
         return True
 
 
-def nurbs(points: ArrayLike, weights: ArrayLike, knots: ArrayLike, degree: int = 3) -> Trajectory:
+def nurbs(points: ArrayLike, weights: ArrayLike, knots: ArrayLike | None = None, degree: int = 3) -> Trajectory:
     r"""Return the curve \sum_i w_i x_i B_i^p(t) / \sum_i w_i B_i^p(t) on its valid span.
 
     Parameters
@@ -56,6 +56,7 @@ def nurbs(points: ArrayLike, weights: ArrayLike, knots: ArrayLike, degree: int =
         Control points.
     weights : (N,), > 0
     knots : (N + degree + 1,), not falling
+        By default clamped and even, on [0, 1].
     degree : int
 
     Raises
@@ -68,7 +69,7 @@ def nurbs(points: ArrayLike, weights: ArrayLike, knots: ArrayLike, degree: int =
     L. Piegl and W. Tiller, The NURBS Book, Springer, 1997, chapter 4.
     """
     x, w = np.asarray(points, dtype=np.float64), np.asarray(weights, dtype=np.float64)
-    t = checked_knots(knots, len(x), degree)
+    t = checked_knots(parameter_knots(None, len(x), degree, None) if knots is None else knots, len(x), degree)
     if len(w) != len(x):
         raise InvalidRequest.of("/options/weights", "shape_mismatch", f"needs {len(x)} entries, has {len(w)}")
     if not (w > 0).all():

@@ -17,7 +17,7 @@ def solve(request: PlanRequest, options: PolynomialOptions) -> Solution:
         raise InvalidRequest.of("/options/interval", "missing", "chebyshev nodes need the interval [a, b]")
     start, end = options.interval
     if not end - start >= MIN_STEP * request.count**2:
-        raise InvalidRequest.of("/options/interval/1", "not_increasing", "must be larger than the first entry")
+        raise InvalidRequest.of("/options/interval/1", "not_increasing", "must exceed the first entry, by 1e-9 s N²")
     nodes = chebyshev_nodes(request.count, start, end)
     return Solution(polynomial(nodes, request.waypoints, start, end), nodes, Stats("newton_form"))
 

@@ -94,8 +94,9 @@ def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: 
     factor = max(needed.factor, 1e-300)
     duration = stretched(factor * trajectory.duration, request.duration)
     factor = duration / trajectory.duration
+    kind = "corner" if request.limits.jerk is None else "corner or jump of curvature"
     if len(corners):
-        notes[Note("stops_at_corners", f"the path has {len(corners)} corner(s); the motion stops at each")] = None
+        notes[Note("stops_at_corners", f"the path has {len(corners)} {kind}(s); the motion stops at each")] = None
     return Solution(
         trajectory.scaled(factor),
         times * factor if path.passes else None,

@@ -106,3 +106,30 @@ def test_what_cannot_be_looked_at_is_refused(ruckig_plan):
         certify(Recorded.of([0, 1], [[0], [1]]), limits={"torque": 1.0})
     with pytest.raises(InvalidRequest):
         certify(ruckig_plan.trajectory, times=[0, 1])
+
+
+def record(dt, blur, start=0.0):
+    """A recorded motion from rest to rest, three joints in 2 s, from time ``start`` on."""
+    motion = plan(PlanRequest.of([[0, 1, -2], [1, 0.3, 2]], times=[0, 2]), "minimum_jerk").trajectory
+    time = np.arange(start, 2 + dt / 2, dt)
+    return Recorded.of(time, blur(motion(np.clip(time, 0, 2))))
+
+
+@pytest.mark.parametrize("dt", [1e-3, 4e-3, 2e-2])
+@pytest.mark.parametrize(
+    "blur",
+    [
+        lambda q: q,
+        lambda q: q + np.random.default_rng(0).normal(size=q.shape) * 1e-9,
+        lambda q: q + np.random.default_rng(1).normal(size=q.shape) * 1e-8,
+        lambda q: np.round(q, 6),
+        lambda q: q.astype(np.float32).astype(float),
+    ],
+    ids=["exact", "noise 1e-9", "noise 1e-8", "six decimals", "float32"],
+)
+def test_honest_records_of_rests_hold_and_others_do_not(dt, blur):
+    rest = {"velocity": [0, 0, 0]}
+    assert certify(record(dt, blur), start=rest, end=rest).holds
+    assert not certify(record(dt, blur, start=0.2), start=rest).holds
+    assert certify(record(dt, blur, start=0.2), end=rest).holds
+    assert not certify(record(dt, blur), start={"velocity": [0.05, 0, 0]}).holds

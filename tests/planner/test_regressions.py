@@ -349,3 +349,30 @@ def test_the_limit_that_binds_is_always_named():
         points, times = rng.normal(size=(4, 1)), np.cumsum(rng.uniform(0.3, 1, 4))
         done = plan(PlanRequest.of(points, times=times, limits={"velocity": 0.1}), "time_scaled")
         assert [n.code for n in done.notes] == ["binding_limit"]
+
+
+SHAPES = {
+    "line": lambda s: np.stack([s, s], axis=1),
+    "ramp": lambda s: np.stack([s, np.sin(7 * s), np.cos(3 * s)], axis=1),
+    "parabola": lambda s: np.stack([s * s, 1 - s], axis=1),
+    "helix": lambda s: np.stack([np.cos(6 * s), np.sin(6 * s), s], axis=1),
+}
+SPLINES = [
+    ("cubic_hermite", {}),
+    ("cubic_spline", {}),
+    ("quintic_spline", {}),
+    ("septic_spline", {}),
+    ("minimum_jerk", {}),
+    *[("bspline", {"degree": degree}) for degree in (2, 3, 4, 5)],
+]
+
+
+@pytest.mark.parametrize("count", [6, 16, 31, 61])
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("method", "options"), SPLINES)
+def test_plain_shapes_keep_the_class_that_is_promised(method, options, shape, count):
+    """The higher derivatives of plain shapes are nothing but rounding, of which jumps must not be made."""
+    points = SHAPES[shape](np.linspace(0, 1, count))
+    for times in (0.5 * np.arange(count), 1e5 + 0.5 * np.arange(count)):
+        done = plan(PlanRequest.of(points, times=times), method, options)
+        assert "smoothness_lost" not in [n.code for n in done.notes], done.certificate.continuity
