@@ -13,6 +13,7 @@ from .errors import Infeasible, InvalidRequest, Unsupported
 from .limits import QUANTITIES, Boundary, magnitude, segment_bounds
 from .method import Capabilities, Method
 from .options import Options
+from .paths import PathOptions
 from .types import MIN_STEP, Demands, Note, PlanRequest
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         A waypoint or an end state breaks a limit, so that nothing can help.
     """
     can, original = method.capabilities(options), request
-    _refuse_unsupported(request, method, can, methods)
+    _refuse_unsupported(request, method, can, methods, options.control_points)
     _require(request, can)
     spacing = options.spacing if isinstance(options, Spaced) else "centripetal"
     fixed = request.times is not None and can.timing == "given"
@@ -111,7 +112,9 @@ def asked_words(request: PlanRequest) -> set[str]:
     return words | {name for name in plain if getattr(request, name) is not None}
 
 
-def _refuse_unsupported(request: PlanRequest, method: Method, can: Capabilities, methods: Iterable[Method]) -> None:
+def _refuse_unsupported(
+    request: PlanRequest, method: Method, can: Capabilities, methods: Iterable[Method], control_points: bool
+) -> None:
     words = asked_words(request)
     refused = words - set(can.words)
     for side in ("start", "end"):
@@ -124,6 +127,10 @@ def _refuse_unsupported(request: PlanRequest, method: Method, can: Capabilities,
     what = ", ".join(sorted(refused))
     others = [m for m in methods if m.id != method.id]
     full = [m.id for m in others if m.honours(words)]
+    along = [m.id for m in others if m.honours(words) and issubclass(m.options, PathOptions)]
+    if control_points and can.timing == "parameter" and along:
+        reason = f"{method.id} does not honour {what}: send the curve as the option path of a method that follows it"
+        raise Unsupported(method.id, what, along, reason)
     raise Unsupported(method.id, what, full or [m.id for m in others if m.honours(refused)])
 
 

@@ -124,9 +124,16 @@ def read_options(model: type[Options], given: Options | dict[str, Any] | None) -
     if isinstance(given, Options):
         return _wrong(model, given)
     try:
-        return model.model_validate(given or {})
+        return model.model_validate(_lists(given or {}))
     except ValidationError as error:
         raise invalid(error, ("options",)) from None
+
+
+def _lists(value: Any) -> Any:
+    """Return the tree with lists for arrays."""
+    if isinstance(value, dict):
+        return {k: _lists(v) for k, v in value.items()}
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _wrong(model: type[Options], given: Options) -> Options:

@@ -66,6 +66,8 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
     with np.errstate(all="ignore"):  # what overflows does not verify
         solution = hold(asked) if asked.still else _solve(row, asked.request, chosen)
     solved = time.perf_counter()
+    if request.timeout is not None and solved - started > request.timeout:
+        raise TimeLimit(request.timeout)
     times = None
     if solution.waypoint_times is not None and not chosen.control_points:
         times = solution.waypoint_times[asked.kept]

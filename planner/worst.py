@@ -18,7 +18,8 @@ class Worst:
     """The worst place of each order and joint; all arrays (R, D).
 
     ``most`` is the largest badness (-inf where nothing counts); ``value``, ``time``, ``piece`` and ``badness`` are
-    those of the first place within 1e-9 of it; ``side`` is 0 at a maximum of the derivative, 1 at a minimum.
+    those of a place within 1e-9 of it, of equally bad ones the first; ``side`` is 0 at a maximum of the derivative, 1
+    at a minimum.
     """
 
     most: Array
