@@ -86,7 +86,7 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
     if found is not None and found < promised:
         if found < 0:
             raise Unsupported(row.id, "precision", reason="rounding leaves a curve whose pieces do not meet")
-        message = f"rounding leaves no more than class C{found} of the C{promised} of this method: the times are uneven"
+        message = f"rounding leaves no more than class C{found} of the C{promised} of this method"
         notes += (Note("smoothness_lost", message),)
     done = time.perf_counter()
     inside = solution.stats.seconds  # 0: the method has no solver to tell apart, all of it is solving
