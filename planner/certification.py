@@ -290,7 +290,8 @@ def _sampled_boundary(recorded: Recorded, demands: Demands, differences: list[tu
                 if order >= len(differences):
                     return float("inf")
                 values = differences[order][1]
-                reached, known = _end_derivative(recorded, order, index)
+                if (judged := _end_derivative(recorded, order, index)) is not None:
+                    reached, known = judged
             limit = demands.limits.bounds(order, demands.dims).scale()
             relative = np.maximum(np.maximum(1.0, limit), np.abs(values).max(axis=0))
             off = np.abs((values[index] if reached is None else reached) - asked)
@@ -299,19 +300,37 @@ def _sampled_boundary(recorded: Recorded, demands: Demands, differences: list[tu
     return worst
 
 
-def _end_derivative(recorded: Recorded, order: int, index: int) -> tuple[Array, Array]:
-    """Return a derivative at the first (0) or last (-1) sample, (D,), and to what it is known.
+def _end_derivative(recorded: Recorded, order: int, index: int) -> tuple[Array, Array] | None:
+    """Return a derivative at the first (0) or last (-1) sample, (D,), and to what it is known; None if it cannot be.
 
     From the polynomial through the outer order + 4 samples; what it changes when it takes fewer is not known, nor what
     noise of 4e-9 of the range, or the record's own roughness, may make of it.
     """
-    t = recorded.time if index == 0 else recorded.time[::-1]
-    q = recorded.position if index == 0 else recorded.position[::-1]
+    outer = _spaced(recorded.time if index == 0 else recorded.time[::-1], order + 4)
+    rows = outer if index == 0 else len(recorded.time) - 1 - outer
+    t, q = recorded.time[rows], recorded.position[rows]
     found = []
-    for count in range(min(order + 2, len(t)), min(order + 4, len(t)) + 1):
+    for count in range(min(order + 2, len(t)), len(t) + 1):
         unit = abs(t[count - 1] - t[0])
         powers = np.vander((t[:count] - t[0]) / unit, increasing=True)
+        if not order < count or np.linalg.matrix_rank(powers, 1e-14) < count:  # too uneven: the difference has to do
+            continue
         found.append(np.linalg.solve(powers, q[:count])[order] * math.factorial(order) / unit**order)
-    rough = np.median(np.abs(np.diff(q, n=4, axis=0)), axis=0) if len(t) > 8 else 0.0  # noise, or what dt hides
-    noise = (4e-9 * position_span(q) + 2.0 * rough) * (4.0 / float(np.abs(np.diff(t[: order + 4])).min())) ** order
+    if not found:
+        return None
+    every = recorded.position
+    rough = np.median(np.abs(np.diff(every, n=4, axis=0)), axis=0) if len(every) > 8 else 0.0  # noise, or what dt hides
+    noise = (4e-9 * position_span(every) + 2.0 * rough) * (4.0 / float(np.abs(np.diff(t)).min())) ** order
     return found[-1], 2.0 * np.ptp(np.stack(found), axis=0) + noise
+
+
+def _spaced(times: Array, most: int) -> NDArray[np.int64]:
+    """Return the first samples, without those that follow another by less than a tenth of the usual step."""
+    least = 0.1 * float(np.median(np.abs(np.diff(times))))
+    chosen = [0]
+    for k in range(1, len(times)):
+        if abs(times[k] - times[chosen[-1]]) >= least:
+            chosen.append(k)
+        if len(chosen) == most:
+            break
+    return np.array(chosen)

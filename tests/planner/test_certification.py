@@ -133,3 +133,15 @@ def test_honest_records_of_rests_hold_and_others_do_not(dt, blur):
     assert not certify(record(dt, blur, start=0.2), start=rest).holds
     assert certify(record(dt, blur, start=0.2), end=rest).holds
     assert not certify(record(dt, blur), start={"velocity": [0.05, 0, 0]}).holds
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-9, 1e-30, 1e-60])
+def test_a_tiny_step_at_the_end_excuses_nothing(gap):
+    """Samples close together say little about a velocity; that must neither hide one nor break the judge."""
+    moving = record(1e-2, lambda q: q, start=0.5)
+    time = np.concatenate([[0.0, gap], moving.time[1:] - 0.5])
+    position = np.concatenate([moving.position[:1], moving.position[:1], moving.position[1:]])
+    rest = {"velocity": [0, 0, 0]}
+    assert not certify(Recorded.of(time, position), start=rest).holds
+    few = Recorded.of([0.0, gap, 1.0], [[0.0], [0.0], [1.0]])
+    certify(few, start={"velocity": [0], "acceleration": [0]}, end={"velocity": [0]})
