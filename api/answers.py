@@ -34,13 +34,13 @@ class PolynomialReply(Reply):
 class CheckReply(Reply):
     """The worst joint, segment and time of one quantity, at the exact extrema; null stands for unbounded."""
 
-    quantity: str = Field(description="What is checked, say velocity or duration")
+    quantity: str = Field(description="What is checked, say velocity, duration or tube")
     joint: int | None = Field(description="The worst joint, from 0")
     segment: int | None = Field(description="The segment it is on, from 0")
     time: float | None = Field(description="When, s")
-    value: float | None = Field(description="The value there, signed")
+    value: float | None = Field(description="The value there, signed; for tube and waypoint_tolerance a width >= 0")
     bound: float | None = Field(description="The side of the limit that is nearest or broken")
-    ratio: float | None = Field(description="value / bound; for positions |value - middle| / half-width")
+    ratio: float | None = Field(description="value / bound; for positions |value - middle| / half-width; null without")
     holds: bool = Field(description="Whether the limit is kept, to 1e-6 relative")
 
 
@@ -52,6 +52,9 @@ class ObjectiveReply(Reply):
     lower_bound: float | None = Field(description="No answer within bound_scope can fall below; null: not computed")
     gap: float | None = Field(description="value / lower_bound - 1, or value where the bound is 0")
     bound_scope: str | None = Field(description="all, method or on_grid: the answers for which the bound holds")
+    kkt: dict[str, float | None] | None = Field(
+        description="Residuals primal, dual and complementarity of the optimality conditions; null: not computed"
+    )
 
 
 class CertificateReply(Reply):
@@ -60,10 +63,12 @@ class CertificateReply(Reply):
     holds: bool = Field(description="Whether every check holds")
     basis: Literal["exact", "enclosure", "finite_differences"] = Field(description="How values were found")
     checks: list[CheckReply] = Field(description="One row per limited quantity")
-    waypoint_error: float | None = Field(description="Largest miss of a waypoint, relative")
-    boundary_error: float | None = Field(description="Largest miss of an end state, relative")
+    waypoint_error: float | None = Field(description="Largest miss of a waypoint beyond its tolerance, relative")
+    boundary_error: float | None = Field(description="Largest miss of a state asked at an end or waypoint, relative")
     continuity: int | None = Field(description="Class C^k; null for one piece")
-    path_deviation: float | None = Field(description="Largest distance from the path to be followed")
+    path_deviation: float | None = Field(
+        description="Largest distance from the path followed, or, with a tube, from the polyline"
+    )
     cost: dict[str, float | None] = Field(description="squared_jerk and path_length")
     objective: ObjectiveReply | None = Field(description="null for methods that minimise nothing")
 

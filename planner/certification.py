@@ -12,8 +12,8 @@ from .errors import InvalidRequest
 from .limits import QUANTITIES, Boundary, Limits
 from .reading import increasing, matrix, vector
 from .trajectory import Trajectory
-from .types import Certificate, Check, Demands
-from .verify import TOLERANCE, position_span, verify
+from .types import TOLERANCE, Certificate, Check, Demands
+from .verify import position_span, verify
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ def certify(
         start=Boundary() if start is None else Boundary.of(start, dims, "/start"),
         end=Boundary() if end is None else Boundary.of(end, dims, "/end"),
     )
-    unseen = [n for n in demands.limits.given() if n not in QUANTITIES]
+    unseen = [n for n in demands.limits.given() if n not in (*QUANTITIES, "velocity_norm")]
     if unseen:
         raise InvalidRequest.of(f"/limits/{unseen[0]}", "unknown_field", "this limit cannot be certified yet")
     if isinstance(trajectory, Recorded):
@@ -170,6 +170,7 @@ def _certify_samples(recorded: Recorded, demands: Demands) -> Certificate:
     whole = verify(polyline, replace(demands, limits=Limits(), start=Boundary(), end=Boundary()), passing)
     differences = _divided_differences(recorded)
     checks = [row for order in range(4) if (row := _difference_row(recorded, differences, demands, order)) is not None]
+    checks += _norm_rows(recorded, differences, demands)
     checks += _sent_rows(recorded)
     boundary_error = _sampled_boundary(recorded, demands, differences)
     errors = (whole.waypoint_error, boundary_error)
@@ -230,11 +231,33 @@ def _difference_row(
         half = 0.5 * (limit.upper[joint] - limit.lower[joint])
         middle = 0.5 * (limit.upper[joint] + limit.lower[joint])
         ratio = float(abs(value - middle) / half) if np.isfinite(half) else None
-    segment = None
-    if demands.times is not None and len(demands.times) > 1:
-        segment = int(np.clip(np.searchsorted(demands.times, at[row], side="right") - 1, 0, len(demands.times) - 2))
     holds = bool(excess.max() <= TOLERANCE)
+    segment = _segment_of(float(at[row]), demands)
     return Check(QUANTITIES[order], joint, segment, float(at[row]), value, bound, ratio, holds)
+
+
+def _segment_of(time: float, demands: Demands) -> int | None:
+    if demands.times is None or len(demands.times) < 2:
+        return None
+    return int(np.clip(np.searchsorted(demands.times, time, side="right") - 1, 0, len(demands.times) - 2))
+
+
+def _norm_rows(recorded: Recorded, differences: list[tuple[Array, Array]], demands: Demands) -> list[Check]:
+    """Return the worst norm of the difference quotients, and of the velocities sent, against its limit.
+
+    The norm of a mean is no larger than the largest norm: every curve through the samples reaches it between them.
+    """
+    bound = demands.limits.velocity_norm
+    if bound is None:
+        return []
+    at, velocity = differences[1]
+    if recorded.velocity is not None:
+        at, velocity = np.concatenate([at, recorded.time]), np.concatenate([velocity, recorded.velocity])
+    norms = np.linalg.norm(velocity, axis=1)
+    row = int(np.argmax(norms))
+    time, value = float(at[row]), float(norms[row])
+    holds = bool(value <= bound * (1.0 + TOLERANCE))
+    return [Check("velocity_norm", None, _segment_of(time, demands), time, value, bound, value / bound, holds)]
 
 
 def _sent_rows(recorded: Recorded) -> list[Check]:

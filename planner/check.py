@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from .curves.options import Spaced
 from .curves.spacing import Spacing, knots, shortest_turns
-from .errors import Infeasible, InvalidRequest, Unsupported
-from .limits import QUANTITIES, Boundary, magnitude, segment_bounds
+from .errors import InvalidRequest, Unsupported
+from .feasibility import refuse_empty_boxes, refuse_hopeless
+from .limits import Boundary, WaypointStates
 from .method import Capabilities, Method
 from .options import Options
 from .paths import PathOptions
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 SAME = 1e-12
 #: A whole motion smaller than this underflows in its derivatives.
 TINY = 1e-100
+#: What may be asked at a waypoint.
+_STATES = ("velocity", "acceleration")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +52,13 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     InvalidRequest
         Something the method requires is missing, or what is given contradicts itself.
     Infeasible
-        A waypoint or an end state breaks a limit, so that nothing can help.
+        A waypoint, a state asked for or a mean velocity breaks a limit, so that nothing can help.
     """
     can, original = method.capabilities(options), request
     _refuse_unsupported(request, method, can, methods, options.control_points)
     _require(request, can)
+    refuse_empty_boxes(request)
+    _refuse_contradiction(request)
     spacing = options.spacing if isinstance(options, Spaced) else "centripetal"
     fixed = request.times is not None and can.timing == "given"
     if spacing != "centripetal" and (fixed or can.timing == "chosen"):
@@ -76,7 +81,7 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         kept = np.arange(request.count)
     start, end = (_resolved(request, can, side) for side in ("start", "end"))
     still = not np.ptp(request.waypoints, axis=0).any() and not _moving(start) and not _moving(end)
-    still = still and not options.moves_by_itself
+    still = still and not options.moves_by_itself and not _moving_waypoints(request.waypoint_states)
     if still and options.model_fields_set:
         options.check(request.waypoints)
     if request.times is None and can.timing == "given":
@@ -86,17 +91,21 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
             how = {"centripetal": "centripetally", "chord_length": "by chord length", "uniform": "uniformly"}[spacing]
             notes.append(Note("times_chosen", f"no times were given: spread {how} over the duration"))
     request = replace(request, start=start, end=end)
-    _refuse_hopeless(request, options.control_points)
+    timed = can.timing == "given" and request.times is not None
+    refuse_hopeless(request, not options.control_points, timed)
     demands = Demands(
         dims=request.dims,
         limits=request.limits,
         waypoints=None if options.control_points else original.waypoints,
-        times=request.times[kept] if can.timing == "given" and request.times is not None else None,
+        times=request.times[kept] if timed and request.times is not None else None,
         segment_limits=original.segment_limits,
         segment_durations=original.segment_durations,
         duration=request.duration,
         start=start,
         end=end,
+        waypoint_states=original.waypoint_states,
+        waypoint_tolerance=original.waypoint_tolerance,
+        tube=original.tube,
     )
     return Asked(request, demands, kept, still, tuple(notes))
 
@@ -122,6 +131,8 @@ def _refuse_unsupported(
         if not _jerk_limited(request).all():
             taken -= can.with_jerk
         refused |= {f"boundary_{name}" for name in getattr(request, side).given() if name not in taken}
+        rests = can.rests & set(_STATES)  # what is zero at the ends cannot be set there as a waypoint's state either
+        refused |= {f"boundary_{n}" for n in rests if np.nan_to_num(_end_states(request, side)[n]).any()}
     if not refused:
         return
     what = ", ".join(sorted(refused))
@@ -142,6 +153,9 @@ def _require(request: PlanRequest, can: Capabilities) -> None:
     for side in (request.start, request.end):
         for name in side.given():
             moving |= getattr(side, name) != 0
+    if request.waypoint_states is not None:
+        for name in _STATES:
+            moving |= (np.nan_to_num(getattr(request.waypoint_states, name)) != 0).any(axis=0)
     for quantity in ("velocity", "acceleration", "jerk"):
         if quantity not in can.requires:
             continue
@@ -202,6 +216,9 @@ def _merged(request: PlanRequest) -> tuple[PlanRequest, NDArray[np.int64]]:
     for i, bounds in enumerate(request.segment_durations or ()):
         if bounds is not None and bounds.min > 0:
             same[i] = False
+    states = request.waypoint_states
+    if states is not None and same.any():
+        same &= _compatible(request, same)
     keep = np.concatenate([[True], ~same])
     if keep[1:].any() and same[-1]:  # the ends stay exact: of a last run of equals the very last waypoint is kept
         keep[np.flatnonzero(keep)[-1]] = False
@@ -221,20 +238,77 @@ def _merged(request: PlanRequest) -> tuple[PlanRequest, NDArray[np.int64]]:
         waypoints=points[keep],
         segment_limits=shorter(request.segment_limits),
         segment_durations=shorter(request.segment_durations),
+        waypoint_states=None if states is None else _united(states, kept, int(keep.sum())),
     ), kept
 
 
+def _compatible(request: PlanRequest, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which waypoints, (N - 1,), ask for no other state than the run of equal ones before them does."""
+    states = request.waypoint_states
+    assert states is not None
+    asked = np.stack([getattr(states, name) for name in _STATES], axis=1)  # (N, 2, D)
+    for side, index in (("start", 0), ("end", -1)):
+        for m, name in enumerate(_STATES):
+            given = getattr(getattr(request, side), name)
+            asked[index, m] = asked[index, m] if given is None else given
+    agree, run = np.ones(len(same), dtype=bool), asked[0]
+    for i, row in enumerate(asked[1:]):
+        agree[i] = not (same[i] and (run != row)[~np.isnan(run) & ~np.isnan(row)].any())
+        run = np.where(np.isnan(row), run, row) if same[i] and agree[i] else row
+    return agree
+
+
+def _united(states: WaypointStates, kept: NDArray[np.int64], count: int) -> WaypointStates:
+    """Return the states of the waypoints that remain: whatever one of those merged asks for."""
+    united = {name: np.full((count, getattr(states, name).shape[1]), np.nan) for name in _STATES}
+    for name, rows in united.items():
+        for i, row in zip(kept, getattr(states, name), strict=True):
+            rows[i] = np.where(np.isnan(rows[i]), row, rows[i])
+    return WaypointStates(**united)
+
+
 def _resolved(request: PlanRequest, can: Capabilities, side: str) -> Boundary:
-    """Return the end state with the method's defaults filled in: zero where it takes or forces a derivative."""
+    """Return the end state with the method's defaults filled in: zero where it takes or forces a derivative.
+
+    What the states at waypoints ask of the first and the last one takes the place of a default, joint by joint.
+    """
     given: Boundary = getattr(request, side)
-    names = getattr(can, side) | can.rests
+    names, states = getattr(can, side) | can.rests, _end_states(request, side)
     values = {}
-    for name in names:
+    for name in names | states.keys():
         value = getattr(given, name)
         values[name] = np.zeros(request.dims) if value is None else value
-        if name in can.with_jerk and value is None:
+        if value is None and name not in names:
+            values[name] = np.full(request.dims, np.nan)
+        elif value is None and name in can.with_jerk:
             values[name] = np.where(_jerk_limited(request), 0.0, np.nan)
+        if name in states:
+            values[name] = np.where(np.isnan(states[name]), values[name], states[name])
     return Boundary(**{n: v for n, v in values.items() if not np.isnan(v).all()})
+
+
+def _end_states(request: PlanRequest, side: str) -> dict[str, Array]:
+    """Return what the states at waypoints ask of the first or the last one, by derivative; NaN for a free joint."""
+    if request.waypoint_states is None:
+        return {name: np.full(request.dims, np.nan) for name in _STATES}
+    index = 0 if side == "start" else -1
+    return {name: getattr(request.waypoint_states, name)[index] for name in _STATES}
+
+
+def _refuse_contradiction(request: PlanRequest) -> None:
+    """Raise ``conflict`` where the state at the first or last waypoint is not the one given for that end."""
+    for side, index in (("start", 0), ("end", request.count - 1)):
+        for name, asked in _end_states(request, side).items():
+            given = getattr(getattr(request, side), name)
+            both = np.zeros(request.dims, dtype=bool) if given is None else ~np.isnan(asked) & ~np.isnan(given)
+            if both.any() and (asked[both] != given[both]).any():
+                joint = int(np.flatnonzero(both & (asked != given))[0])
+                reason = f"/{side} asks joint {joint} for another {name} at the same waypoint"
+                raise InvalidRequest.of(f"/waypoint_states/{index}/{name}", "conflict", reason)
+
+
+def _moving_waypoints(states: WaypointStates | None) -> bool:
+    return states is not None and any(np.nan_to_num(getattr(states, name)).any() for name in _STATES)
 
 
 def _jerk_limited(request: PlanRequest) -> NDArray[np.bool_]:
@@ -245,37 +319,3 @@ def _jerk_limited(request: PlanRequest) -> NDArray[np.bool_]:
 
 def _moving(state: Boundary) -> bool:
     return any(np.nan_to_num(getattr(state, name)).any() for name in state.given())
-
-
-def _refuse_hopeless(request: PlanRequest, control_points: bool) -> None:
-    """Refuse what no motion can cure: a waypoint (unless it need not be passed) or an end state beyond its limit."""
-    last = request.count - 2
-    if not control_points:
-        _refuse_beyond(request, 0, np.stack([request.waypoints[:-1], request.waypoints[1:]]), 0, "a waypoint")
-    for side, segment in ((request.start, 0), (request.end, last)):
-        for order in (1, 2, 3):
-            state = getattr(side, QUANTITIES[order], None)
-            if state is not None:
-                _refuse_beyond(request, order, state[None], segment, "the state asked at an end")
-
-
-def _refuse_beyond(request: PlanRequest, order: int, values: Array, first: int, what: str) -> None:
-    """Refuse values (…, S, D), for the segments from ``first`` on, of which one lies beyond its limits: the worst."""
-    limit = segment_bounds(request.limits, request.segment_limits, order, request.count - 1, request.dims)
-    rows = slice(first, first + values.shape[-2])
-    lower, upper = limit.lower[rows], limit.upper[rows]
-    over = np.nan_to_num(np.maximum(values - upper, lower - values) / magnitude(lower, upper), nan=-np.inf)
-    if over.max() > 1e-9:  # NaN is a free joint
-        worst = np.unravel_index(int(np.argmax(over)), over.shape)
-        row, joint = int(worst[-2]), int(worst[-1])
-        value, segment = float(values[worst]), first + row
-        raise Infeasible(
-            f"{what} breaks the {QUANTITIES[order]} limit of joint {joint} on segment {segment}",
-            joint=joint,
-            quantity=QUANTITIES[order],
-            segment=segment,
-            time=None if request.times is None else float(request.times[segment]),
-            bound=float(upper[row, joint] if value > upper[row, joint] else lower[row, joint]),
-            needed=value,
-            certified=True,
-        )

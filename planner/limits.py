@@ -124,6 +124,15 @@ def segment_bounds(whole: Limits, segments: Sequence[Limits | None] | None, orde
     return Limit(lower, upper)
 
 
+def norm_bounds(whole: Limits, segments: Sequence[Limits | None] | None, count: int) -> Array:
+    """Return the bound of the velocity's norm on every segment, (count,): the tighter one, infinite where none is."""
+    bounds = np.full(count, np.inf if whole.velocity_norm is None else whole.velocity_norm)
+    for i, own in enumerate(segments or ()):
+        if own is not None and own.velocity_norm is not None:
+            bounds[i] = min(bounds[i], own.velocity_norm)
+    return bounds
+
+
 @dataclass(frozen=True)
 class DurationBounds:
     """Bounds of a duration in s."""
@@ -217,7 +226,7 @@ def positive(value: Any, field: str) -> float:
     """Return a finite number > 0."""
     read = reading.number(value, field)
     if read <= 0:
-        raise InvalidRequest.of(field, "bad_limits" if field.startswith("/limits") else "out_of_range", "must be > 0")
+        raise InvalidRequest.of(field, "bad_limits" if "limits/" in field else "out_of_range", "must be > 0")
     return read
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from .options import CAPABILITIES, Options
-from .types import PlanRequest, Solution
+from .types import Minimised, PlanRequest, Solution
 
 Timing = Literal["given", "chosen", "either", "parameter"]
 Family = Literal["interpolation", "smoothing", "time_optimal"]
@@ -69,7 +69,8 @@ class Method:
     """A row of the method table.
 
     ``capabilities`` is a function of the options; ``variants`` are the options where its value differs from the
-    default's, so that the catalogue can list them.
+    default's, so that the catalogue can list them. ``objective`` is the word for what it minimises; where that depends
+    on the options, ``minimises`` tells it in full.
     """
 
     id: str
@@ -83,6 +84,7 @@ class Method:
     capabilities: Callable[[Any], Capabilities]
     path: Literal["free", "fixed", "approximate"] = "free"
     objective: str | None = None
+    minimises: Callable[[Any], Minimised | None] = lambda options: None
     variants: tuple[Mapping[str, Any], ...] = ()
 
     def honours(self, words: set[str]) -> bool:

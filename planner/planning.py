@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bounds import objective
+from .bounds import minimised_by, objective
 from .check import Asked, check
 from .errors import InvalidRequest, NotVerified, TimeLimit, UnknownMethod, Unsupported
 from .method import Method
@@ -16,8 +16,8 @@ from .methods import METHODS
 from .options import Options, read_options
 from .timing.stops import segment_durations
 from .trajectory import Trajectory
-from .types import Certificate, Note, PlanRequest, Solution, Stats
-from .verify import TOLERANCE, position_span, verify
+from .types import TOLERANCE, Certificate, Note, PlanRequest, Solution, Stats
+from .verify import position_span, verify
 
 Array = NDArray[np.float64]
 
@@ -75,8 +75,8 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
         certificate = verify(solution.trajectory, asked.demands, times, solution.path)
     if request.timeout is not None and time.perf_counter() - started > request.timeout:
         raise TimeLimit(request.timeout)
-    name = row.objective
-    judged = replace(certificate, objective=objective(name, certificate, solution.trajectory.duration, solution.bound))
+    minimised = solution.minimised or row.minimises(chosen) or minimised_by(row.objective)
+    judged = replace(certificate, objective=objective(minimised, solution.trajectory, certificate, solution.bound))
     if not certificate.holds:
         if (reason := beyond_precision(solution.trajectory, asked.request.waypoints)) is not None:
             raise Unsupported(row.id, "precision", reason=reason)

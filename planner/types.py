@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 #: Shortest time between two waypoints, s; below it derivatives leave the range of floating point.
 MIN_STEP = 1e-9
+#: Largest relative violation of anything asked that may still be called kept.
+TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +187,9 @@ class Demands:
     duration: DurationBounds | None = None
     start: Boundary = field(default_factory=Boundary)
     end: Boundary = field(default_factory=Boundary)
+    waypoint_states: WaypointStates | None = None
+    waypoint_tolerance: Array | None = None
+    tube: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -220,6 +225,26 @@ class Evidence(Protocol):
         """Return a value that no answer of the bound's scope can fall below."""
 
 
+@runtime_checkable
+class Optimality(Protocol):
+    """Evidence that can also tell how well the conditions of an optimum are met, computed again by us."""
+
+    def residuals(self) -> Mapping[str, float]:
+        """Return the residuals ``primal``, ``dual`` and ``complementarity``."""
+
+
+@dataclass(frozen=True)
+class Minimised:
+    """What a method minimised: the integral of the squared derivative of ``order``, plus a price of time.
+
+    The value is the sum over the joints of the integral (none for order 0) + ``time_weight`` * duration.
+    """
+
+    name: str
+    order: int
+    time_weight: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Bound:
     """A lower bound of the objective and for which set of answers it holds: ``all``, ``method`` or ``on_grid``."""
@@ -230,7 +255,7 @@ class Bound:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A method's answer, before anyone has checked it."""
+    """A method's answer, before anyone has checked it; ``minimised`` None: what its row of the table says."""
 
     trajectory: Trajectory
     waypoint_times: Array | None
@@ -238,6 +263,7 @@ class Solution:
     path: Followed | None = None
     bound: Bound | None = None
     notes: tuple[Note, ...] = ()
+    minimised: Minimised | None = None
 
 
 @dataclass(frozen=True)
@@ -256,13 +282,18 @@ class Check:
 
 @dataclass(frozen=True)
 class Objective:
-    """What the method minimised, its value, and how far from the lower bound it can be."""
+    """What the method minimised, its value, and how far from the lower bound it can be.
+
+    ``kkt``: residuals ``primal``, ``dual`` and ``complementarity`` of the optimality conditions, where the bound's
+    evidence can tell them.
+    """
 
     name: str
     value: float
     lower_bound: float | None
     gap: float | None
     bound_scope: str | None
+    kkt: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)

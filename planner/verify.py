@@ -9,18 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .corridors import norm_row, polyline_distance, tolerance_row, tube_row
 from .jumps import counted_jumps, smoothness_lost
 from .limits import QUANTITIES, Boundary, DurationBounds, Limit, magnitude, segment_bounds
 from .quadrature import integral
 from .rational import noise_of
 from .trajectory import Trajectory
-from .types import Certificate, Check, Demands, Followed
+from .types import TOLERANCE, Certificate, Check, Demands, Followed
 from .worst import TIE, Worst, measures, peaks, worst
 
 Array = NDArray[np.float64]
-
-#: Largest relative violation of anything asked that may still be called kept.
-TOLERANCE = 1e-6
 
 
 def verify(
@@ -35,7 +33,7 @@ def verify(
     ----------
     trajectory : Trajectory
     demands : Demands
-        Limits, waypoints, times, boundary states and durations that must be kept.
+        Limits, waypoints, times, boundary states, durations, tolerances and tubes that must be kept.
     waypoint_times : (N,)
         When the waypoints are passed; where ``demands.times`` is set, those count instead.
     path : Followed
@@ -49,16 +47,21 @@ def verify(
     at = demands.times if demands.times is not None else waypoint_times
     inner = trajectory if at is None else trajectory.split(at)
     motion = _measure(inner, demands, at)
+    missed = _missed(inner, demands, at)
     checks = _limit_rows(motion)
+    checks += [row] if (row := norm_row(inner, demands, motion.segment, motion.jumps[1])) is not None else []
     checks += _duration_rows(trajectory, demands, at)
-    waypoint_error = _waypoint_error(inner, demands, at, motion.span)
-    boundary_error = _boundary_error(motion)
+    checks += _corridor_rows(motion, missed, at)
+    waypoint_error = _waypoint_error(missed, demands, at, motion.span)
+    boundary_error = _boundary_error(motion, at if missed is not None else None)
     deviation = None if path is None else _path_deviation(trajectory, path)
     errors = [
         waypoint_error,
         boundary_error,
         None if deviation is None else deviation / motion.span,
     ]
+    if path is None and demands.tube is not None and demands.waypoints is not None and missed is not None:
+        deviation = polyline_distance(inner, demands.waypoints, motion.segment)  # told; what is judged is the tube
     jerk_bounded = not motion.unbounded[3].any()
     return Certificate(
         holds=all(c.holds for c in checks) and all(e is None or e <= TOLERANCE for e in errors),
@@ -218,40 +221,78 @@ def _duration_row(quantity: str, value: float, bounds: DurationBounds, segment: 
     return Check(quantity, None, segment, None, value, bound, ratio, holds)
 
 
-def _waypoint_error(trajectory: Trajectory, demands: Demands, at: Array | None, span: float) -> float | None:
-    """Return the largest miss of a waypoint from either side, for a trajectory with breaks at the times."""
+def _corridor_rows(motion: _Motion, missed: Array | None, at: Array | None) -> list[Check]:
+    demands = motion.demands
+    rows = [tolerance_row(missed, demands, at, motion.span)]
+    if demands.tube is not None and missed is None:  # which segment a position belongs to is not known
+        rows.append(Check("tube", None, None, None, None, None, None, False))
+    else:
+        rows.append(tube_row(motion.trajectory, demands, motion.segment, motion.span))
+    return [row for row in rows if row is not None]
+
+
+def _missed(trajectory: Trajectory, demands: Demands, at: Array | None) -> Array | None:
+    """Return the distances from the waypoints at their times, from the side that is further off, (N, D).
+
+    The trajectory has breaks at the times. None where there are no such times, or they are not the trajectory's.
+    """
     if demands.waypoints is None or at is None:
         return None
     slack = 1e-9 * max(1.0, trajectory.duration)
     inside = (at >= trajectory.start - slack) & (at <= trajectory.end + slack)
     if len(at) != len(demands.waypoints) or not inside.all() or (np.diff(at) < 0).any():
-        return float("inf")
-    reached = trajectory(np.clip(at, trajectory.start, trajectory.end))
-    off = np.abs(reached - demands.waypoints)
+        return None
+    return np.asarray(np.abs(_on_both_sides(trajectory, at, 0) - demands.waypoints).max(axis=0))
+
+
+def _on_both_sides(trajectory: Trajectory, at: Array, order: int) -> Array:
+    """Return a derivative at times, from the right and from the left of them, (2, N, D)."""
+    right = trajectory(np.clip(at, trajectory.start, trajectory.end), order)
+    left = right.copy()
     before = np.searchsorted(trajectory.breaks, at) - 1  # the piece that ends there, if one does
     ends = (before >= 0) & (trajectory.breaks[np.minimum(before + 1, trajectory.pieces)] == at)
     if ends.any():
-        missed = np.abs(trajectory.ends(0)[1][before[ends]] - demands.waypoints[ends])
-        off[ends] = np.maximum(off[ends], missed)
-    return float(off.max() / span)
+        left[ends] = trajectory.ends(order)[1][before[ends]]
+    return np.stack([right, left])
 
 
-def _boundary_error(motion: _Motion) -> float | None:
-    """Return the largest error of a pinned end state, relative to max(1, limit, peak) of that derivative and joint."""
-    worst = None
-    ends: tuple[tuple[Boundary, int], ...] = ((motion.demands.start, 0), (motion.demands.end, -1))
+def _waypoint_error(missed: Array | None, demands: Demands, at: Array | None, span: float) -> float | None:
+    """Return the largest miss of a waypoint; of an interior one only what lies beyond its tolerance counts."""
+    if demands.waypoints is None or at is None:
+        return None
+    if missed is None:
+        return float("inf")
+    if demands.waypoint_tolerance is not None:
+        missed = missed.copy()
+        missed[1:-1] = np.maximum(missed[1:-1] - demands.waypoint_tolerance, 0.0)
+    return float(missed.max() / span)
+
+
+def _boundary_error(motion: _Motion, at: Array | None) -> float | None:
+    """Return the largest error of a state asked at an end, or at a waypoint (at times ``at``) from either side.
+
+    Relative to max(1, limit, peak) of that derivative and joint.
+    """
+    demands, errors = motion.demands, []
+    asked: list[tuple[int, Array, Array]] = []  # order, what is asked, what is reached
+    ends: tuple[tuple[Boundary, int], ...] = ((demands.start, 0), (demands.end, -1))
     for boundary, index in ends:
         for order, name in enumerate(QUANTITIES):
-            asked = getattr(boundary, name, None)
-            if asked is None:
-                continue
-            limit = motion.demands.limits.bounds(order, motion.demands.dims).scale()
-            relative = np.maximum(np.maximum(1.0, limit), motion.peaks[order])
-            left, right = motion.trajectory.ends(order)
-            reached = (left if index == 0 else right)[index]
-            error = float((np.abs(reached - asked) / relative)[~np.isnan(asked)].max(initial=0.0))
-            worst = error if worst is None else max(worst, error)
-    return worst
+            if getattr(boundary, name, None) is not None:
+                left, right = motion.trajectory.ends(order)
+                asked.append((order, getattr(boundary, name), (left if index == 0 else right)[index]))
+    states = demands.waypoint_states
+    if states is not None:
+        if at is None:
+            return float("inf")
+        for order, rows in ((1, states.velocity), (2, states.acceleration)):
+            asked.append((order, rows, _on_both_sides(motion.trajectory, at, order)))
+    for order, wanted, reached in asked:
+        limit = demands.limits.bounds(order, demands.dims).scale()
+        relative = np.maximum(np.maximum(1.0, limit), motion.peaks[order])
+        off = np.abs(reached - wanted) / relative
+        errors.append(float(off[~np.isnan(np.broadcast_to(wanted, off.shape))].max(initial=0.0)))
+    return max(errors, default=None)
 
 
 def _path_deviation(trajectory: Trajectory, path: Followed) -> float:

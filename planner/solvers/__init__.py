@@ -1,7 +1,7 @@
 """Back ends for the statements of ``problems``: the table, and the rule by which one is picked.
 
-``auto`` picks the first row of the kind, in the order of the table, whose module is installed. What ran is in the
-answer's ``solver.name``.
+``auto`` tries the rows of the kind in the order of the table, as far as their modules are installed: the next one where
+the one before comes to no end. What ran is in the answer's ``solver.name``.
 """
 
 from collections.abc import Callable
@@ -14,12 +14,19 @@ from ..errors import SolverFailed
 
 @dataclass(frozen=True)
 class Backend:
-    """A solver: name, kind of problem, module needed, and settings for a tolerance and a time limit in s."""
+    """A solver.
+
+    Name, kinds of problem (``qp``; ``cone``: with second-order cones; ``nlp``), module needed, settings for a tolerance
+    and a time limit in s; ``precision`` is how well it keeps rows that are scaled to one, ``most`` the largest number
+    of unknowns that it is meant for.
+    """
 
     name: str
-    kind: str
+    kinds: tuple[str, ...]
     module: str
     settings: Callable[[float, float | None], dict[str, Any]]
+    precision: float = 1e-9
+    most: float = float("inf")
 
     @property
     def available(self) -> bool:
@@ -27,8 +34,23 @@ class Backend:
         return find_spec(self.module) is not None
 
 
+def _own(tolerance: float, limit: float | None) -> dict[str, Any]:
+    return {}
+
+
+def _clarabel(tolerance: float, limit: float | None) -> dict[str, Any]:
+    names = ("tol_gap_abs", "tol_gap_rel", "tol_feas")
+    settings: dict[str, Any] = {"verbose": False, "max_iter": 200, **dict.fromkeys(names, tolerance)}
+    return settings if limit is None else {**settings, "time_limit": limit}
+
+
 def _piqp(tolerance: float, limit: float | None) -> dict[str, Any]:
     return {"eps_abs": tolerance, "eps_rel": tolerance, "max_iter": 500}
+
+
+def _daqp(tolerance: float, limit: float | None) -> dict[str, Any]:
+    settings: dict[str, Any] = {"primal_tol": tolerance, "dual_tol": tolerance, "iter_limit": 20_000}
+    return settings if limit is None else {**settings, "time_limit": limit}
 
 
 def _osqp(tolerance: float, limit: float | None) -> dict[str, Any]:
@@ -42,9 +64,12 @@ def _ipopt(tolerance: float, limit: float | None) -> dict[str, Any]:
 
 
 BACKENDS: tuple[Backend, ...] = (
-    Backend("piqp", "qp", "piqp", _piqp),
-    Backend("osqp", "qp", "osqp", _osqp),
-    Backend("ipopt", "nlp", "casadi", _ipopt),
+    Backend("interior_point", ("qp",), "numba", _own),
+    Backend("clarabel", ("qp", "cone"), "clarabel", _clarabel),
+    Backend("piqp", ("qp",), "piqp", _piqp),
+    Backend("daqp", ("qp",), "daqp", _daqp, most=500),
+    Backend("osqp", ("qp",), "osqp", _osqp, precision=1e-7),
+    Backend("ipopt", ("nlp",), "casadi", _ipopt),
 )
 
 
@@ -56,7 +81,7 @@ def select(kind: str, name: str = "auto") -> tuple[Backend, ...]:
     SolverFailed
         None of that kind (and name) is installed.
     """
-    found = tuple(b for b in BACKENDS if b.kind == kind and b.available and name in ("auto", b.name))
+    found = tuple(b for b in BACKENDS if kind in b.kinds and b.available and name in ("auto", b.name))
     if not found:
         raise SolverFailed(name, f"no back end for {kind} is installed")
     return found

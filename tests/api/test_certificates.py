@@ -177,3 +177,14 @@ def test_very_high_coefficients_do_not_break_the_judge(service):
     response = service.post(CERTIFY, json={"trajectory": {"polynomial": wild}, "limits": {"jerk": 1}})
     assert response.status_code == 200 and not response.json()["certificate"]["holds"]
     assert "NaN" not in response.text and "Infinity" not in response.text
+
+
+def test_the_norm_of_the_velocity(service):
+    arc = {"breaks": [0, 1], "coefficients": [[[0, 0]], [[3, 0]], [[0, 4]]]}  # (3, 8 t): at the end 8.544
+    found = certify(service, {"polynomial": arc}, limits={"velocity_norm": 8})
+    row = found["checks"][0]
+    assert (row["quantity"], row["joint"], row["time"], row["holds"]) == ("velocity_norm", None, 1.0, False)
+    assert row["value"] == pytest.approx(73**0.5)
+    samples = {"time": [0, 0.5, 1], "position": [[0, 0], [1.5, 1], [3, 4]]}
+    found = certify(service, {"samples": samples}, limits={"velocity_norm": 8})
+    assert found["checks"][0]["value"] == pytest.approx(45**0.5) and found["checks"][0]["holds"]

@@ -181,6 +181,19 @@ def test_a_body_over_the_cap(service, problem, chunked):
 
 
 @pytest.mark.parametrize("path", [PLAN, "/v1/comparisons", "/v1/certificates"])
+@pytest.mark.parametrize(("count", "what"), [(10_000_000, "body"), (300_000, "waypoints")])
+def test_millions_of_waypoints(service, problem, path, count, what):
+    """Ten million are more than a body may hold; 300,000 fit, and are counted and refused before any work."""
+    started = time.perf_counter()
+    extra = {PLAN: b"}", "/v1/comparisons": b',"methods":"all"}', "/v1/certificates": b',"trajectory":%s}'}[path]
+    extra = extra.replace(b"%s", b'{"polynomial":{"breaks":[0,1],"coefficients":[[[0]]]}}')
+    raw = b'{"waypoints":[' + b"[0]," * (count - 1) + b"[1]]" + extra
+    document = problem(service.post(path, content=raw, headers=JSON), "too_large")
+    assert document["what"] == what and document["status"] == 413
+    assert time.perf_counter() - started < 5
+
+
+@pytest.mark.parametrize("path", [PLAN, "/v1/comparisons", "/v1/certificates"])
 @pytest.mark.parametrize(
     "headers",
     [

@@ -80,6 +80,7 @@ def test_the_contracts_example(service):
     assert objective["name"] == "squared_jerk" and objective["bound_scope"] == "method"
     assert [objective["value"], objective["lower_bound"]] == pytest.approx([452.5, 452.5])
     assert abs(objective["gap"]) < 1e-9
+    assert "kkt" in objective
     assert answer["solver"]["status"] == "solved"
     assert answer["warnings"] == []
     assert len(answer["digest"]) == 64

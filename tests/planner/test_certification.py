@@ -101,7 +101,7 @@ def test_bad_samples(samples, field, code):
 
 def test_what_cannot_be_looked_at_is_refused(ruckig_plan):
     with pytest.raises(InvalidRequest):
-        certify(ruckig_plan.trajectory, limits={"velocity_norm": 1.0})
+        certify(ruckig_plan.trajectory, limits={"tip_speed": 1.0})
     with pytest.raises(InvalidRequest):
         certify(Recorded.of([0, 1], [[0], [1]]), limits={"torque": 1.0})
     with pytest.raises(InvalidRequest):
@@ -145,3 +145,18 @@ def test_a_tiny_step_at_the_end_excuses_nothing(gap):
     assert not certify(Recorded.of(time, position), start=rest).holds
     few = Recorded.of([0.0, gap, 1.0], [[0.0], [0.0], [1.0]])
     certify(few, start={"velocity": [0], "acceleration": [0]}, end={"velocity": [0]})
+
+
+def test_the_norm_of_the_velocity(ruckig_plan):
+    t = np.linspace(0, ruckig_plan.trajectory.end, 4000)
+    speed = float(np.linalg.norm(ruckig_plan.trajectory(t, 1), axis=1).max())
+    plain = Recorded.of(t, ruckig_plan.trajectory(t))
+    sent = Recorded.of(t, ruckig_plan.trajectory(t), ruckig_plan.trajectory(t, 1))
+    for trajectory, close in ((ruckig_plan.trajectory, 1e-6), (sent, 1e-9), (plain, 1e-4)):
+        for factor, holds in ((1.001, True), (0.999, False)):
+            found = certify(trajectory, limits={"velocity_norm": speed * factor})
+            (row,) = [c for c in found.checks if c.quantity == "velocity_norm"]
+            assert found.holds == row.holds == holds and row.joint is None
+            assert row.value == pytest.approx(speed, rel=close) and row.ratio == row.value / row.bound
+    wild = Recorded.of(t, ruckig_plan.trajectory(t), 2 * ruckig_plan.trajectory(t, 1))
+    assert not certify(wild, limits={"velocity_norm": speed * 1.5}).checks[0].holds

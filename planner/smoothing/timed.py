@@ -1,0 +1,96 @@
+"""Smoothest trajectories whose times are free: first the times, then the trajectory at those times."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.banded_qp import KKTPoint
+from problems.free_times import Stationary
+
+from ..deadline import Deadline
+from ..errors import Infeasible, InvalidRequest, SolverFailed, TimeLimit
+from ..limits import QUANTITIES, Boundary, segment_bounds
+from ..trajectory import Trajectory
+from ..types import Bound, Minimised, PlanRequest, Solution, Stats
+from .free_times import FreeTimes, optimal_times
+from .least_duration import optimal_times_within
+from .minimum_jerk import Smoothing, smoothest
+
+Array = NDArray[np.float64]
+
+#: What a unit of time costs where nothing is limited and nothing else was asked.
+TIME_WEIGHT = 1.0
+
+
+def freely_timed(request: PlanRequest, how: Smoothing, time_weight: float | None, name: str) -> Solution:
+    """Return the trajectory of least cost plus weight times duration, or (limits, no weight) of least duration.
+
+    Of the motions at the times found, the smoothest within the limits is taken. ``name`` is what the cost is called.
+
+    Raises
+    ------
+    Infeasible
+        No times are found at which the limits can be kept; or a waypoint or end state breaks one (certified).
+    InvalidRequest, SolverFailed, TimeLimit
+    """
+    deadline = Deadline(request.timeout)
+    k, points = how.order, request.waypoints
+    start, end = (_given(side, k, request.dims) for side in (request.start, request.end))
+    bounds = [
+        segment_bounds(request.limits, request.segment_limits, m, request.count - 1, request.dims) for m in range(4)
+    ]
+    lower, upper = (np.stack([getattr(b, side) for b in bounds]) for side in ("lower", "upper"))
+    asked = (request.duration, request.segment_durations, deadline)
+    limited = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
+    weight = time_weight if limited or time_weight is not None else TIME_WEIGHT
+    if limited:
+        backend = how.backend if how.backend == "ipopt" else "auto"
+        found = optimal_times_within(points, k, start, end, lower, upper, weight, *asked, backend)
+    else:
+        assert weight is not None
+        found = optimal_times(points, k, start, end, weight, *asked)
+    minimised = Minimised("duration", 0, 1.0)
+    if weight is not None:
+        minimised = Minimised(f"{name}_plus_time", k, weight)
+    times = np.concatenate([[0.0], np.cumsum(found.h)])
+    if request.duration is not None and abs(times[-1] - request.duration.nearest(times[-1])) <= 1e-9 * times[-1]:
+        times[-1] = request.duration.nearest(times[-1])
+    return _at(request, how, times, found, minimised, limited, deadline)
+
+
+def _at(
+    request: PlanRequest,
+    how: Smoothing,
+    times: Array,
+    found: FreeTimes,
+    minimised: Minimised,
+    limited: bool,
+    deadline: Deadline,
+) -> Solution:
+    """Return the smoothest trajectory at the times found; the one found with them where limits leave no other."""
+    stats = Stats("free_times" if not limited else "least_duration", found.status, found.iterations)
+    free = request.duration is None and request.segment_durations is None and minimised.order > 0
+    fixed = replace(request, times=times, duration=None, segment_durations=None, timeout=deadline.left())
+    backend = "auto" if how.backend == "ipopt" else how.backend
+    try:
+        inner = smoothest(fixed, replace(how, parts=1, backend=backend))
+    except (Infeasible, InvalidRequest, SolverFailed, TimeLimit):
+        if not limited:
+            raise
+        trajectory = Trajectory.from_states(times, request.waypoints, np.ascontiguousarray(found.states))
+        return Solution(trajectory, times, stats, minimised=minimised)
+    bound = None
+    if free and not limited and inner.bound is not None and isinstance(inner.bound.evidence, KKTPoint):
+        rates = np.stack([inner.trajectory(times, m) for m in range(1, how.order)])
+        states = np.concatenate([request.waypoints[None], rates])
+        evidence = Stationary(np.diff(times), states, minimised.time_weight, inner.bound.evidence)
+        bound = Bound("method", evidence)
+    return Solution(inner.trajectory, times, stats, bound=bound, minimised=minimised)
+
+
+def _given(side: Boundary, order: int, dims: int) -> Array:
+    """Return the derivatives of order 1 … k-1 asked at an end, (k - 1, D); NaN where free."""
+    free = np.full(dims, np.nan)
+    values = [getattr(side, QUANTITIES[m]) for m in range(1, order)]
+    return np.stack([free if v is None else v for v in values])
