@@ -91,5 +91,53 @@ CASES: dict[str, Case] = {
             "UR5e pick and place under velocity, acceleration and jerk limits",
             {"waypoints": PICK_AND_PLACE, "limits": UR5E},
         ),
+        Case(
+            "ur5e_times_limits",
+            "UR5e pick and place at given times that are short for its limits: acceleration and jerk reach them",
+            {
+                "waypoints": PICK_AND_PLACE,
+                "times": [0.0, 0.45, 0.825, 1.125, 1.725, 2.325, 2.7, 3.45],
+                "limits": UR5E,
+            },
+        ),
+        Case(
+            "ur5e_corridor",
+            "UR5e pick and place at given times, near the waypoints and inside a tube between them",
+            {
+                "waypoints": PICK_AND_PLACE,
+                "times": [0.0, 0.6, 1.1, 1.5, 2.3, 3.1, 3.6, 4.6],
+                "limits": {"velocity": UR5E["velocity"], "acceleration": UR5E["acceleration"]},
+                "waypoint_tolerance": 0.02,
+                "tube": 0.05,
+            },
+        ),
+        Case(
+            "pen_speed",
+            "A pen in the plane at given times, its speed along the path limited",
+            {
+                "waypoints": [[0, 0], [0.3, 0.4], [0.8, 0.4], [1.0, 0], [0.6, -0.3], [0, 0]],
+                "times": [0, 0.8, 1.6, 2.3, 3.0, 4.0],
+                "limits": {"velocity_norm": 1.0},
+            },
+        ),
+        Case(
+            "ur5e_free_times",
+            "UR5e pick and place in the least time, the times at the waypoints free, slow near the two parts",
+            {
+                "waypoints": PICK_AND_PLACE,
+                "limits": UR5E,
+                "segment_limits": [
+                    None,
+                    {"velocity": 0.5},
+                    {"velocity": 0.5},
+                    None,
+                    None,
+                    {"velocity": 0.5},
+                    {"velocity": 1.5},
+                ],
+                "method": "minimum_jerk",
+                "options": {"free_times": True},
+            },
+        ),
     )
 }

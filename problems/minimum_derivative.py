@@ -200,14 +200,19 @@ class MinimumDerivative:
         there = self.local >= 0
         return np.asarray(np.bincount(self.local[there], pull[there], self.size))
 
-    @cached_property
+    @property
     def constant(self) -> float:
         """Return the constant term."""
+        return float(self.constants.sum())
+
+    @cached_property
+    def constants(self) -> Array:
+        """Return each joint's constant term, (D,)."""
         upper = np.einsum(
             "pa,amd->pmd", hermite_basis(self.order)[self.order :], self.given * self._powers(self.h)[:, :, None]
         )
-        each = np.einsum("pmd,pq,qmd->m", upper, _gram(self.order), upper)  # squares: nothing cancels
-        return float(each @ self.h ** (1.0 - 2 * self.order))
+        each = np.einsum("pmd,pq,qmd->md", upper, _gram(self.order), upper)  # squares: nothing cancels
+        return np.asarray(self.h ** (1.0 - 2 * self.order) @ each)
 
     def filled(self, y: Array) -> Array:
         """Return displacements and derivatives at all nodes, (k, M + 1, D)."""

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 #: Residuals that pass where rounding stops them above the accuracy asked.
-PASSES = 2e-10
+PASSES = 2e-11
 #: What part of the way to the boundary a step goes.
 TO_THE_BOUNDARY = 0.995
 

@@ -22,7 +22,10 @@ def chebyshev_slope(n: int, j: int) -> float:
 
 
 def most_cost(statement: MinimumDerivative, limits: LinearLimits, norm: Array | None = None) -> float:
-    """Return a cost, scaled, that no motion within the limits exceeds; infinite where a gap is not limited."""
+    """Return a cost, scaled, that no best motion within the limits exceeds; infinite where a gap is not limited.
+
+    The statement's unknowns are to count from the optimum without limits.
+    """
     k = statement.order
     total = 0.0
     for d in range(statement.dims):
@@ -35,7 +38,10 @@ def most_cost(statement: MinimumDerivative, limits: LinearLimits, norm: Array | 
             most = np.fmin(most, _highest(wide, statement, m))
         if norm is not None:
             most = np.fmin(most, _highest(norm, statement, 1))
-        total += float((statement.h * most**2).sum())
+        if not own.any() and not statement.bound:  # nothing keeps it from its own optimum, from which unknowns count
+            total += float(statement.constants[d])
+        else:
+            total += float((statement.h * most**2).sum())
     return total * (1.0 + 1e-9)
 
 

@@ -1,6 +1,7 @@
 """The Euclidean norm of the velocity, kept through second-order cones at the places where it breaks its bound."""
 
 import time
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +42,11 @@ def kept_within_norm(cuts: Cuts, posed: Posed, norm: Array, tighter: float, ceil
     seconds, used = 0.0, 0
     for turn in range(ROUNDS):
         found, worst = cuts.at(y, 0.0, False)
-        fast, where = _fastest(posed, y, norm * (1.0 - 0.5 * tighter))
+        fast, where = fastest(posed, norm * (1.0 - 0.5 * tighter), y)
         if worst <= 0.0 and not len(fast):
             program = _with_cones(cuts, cuts.program(rows, own=True), gap, u, norm)
-            program, z = _sharpened(cuts, program, y, z, gap, u, norm)
-            return Kept(y, z, program, rows, backend.name, used, seconds)
+            sharp, z = _sharpened(cuts, program, y, z, gap, u, norm)
+            return Kept(y, z, partial(_same, sharp), backend.name, used, seconds)
         if not len(y):
             raise NoPoint(found, np.ones(len(found.u)), bool(len(found.u)))
         rows = found if turn == 0 else rows.and_(found)
@@ -60,6 +61,10 @@ def kept_within_norm(cuts: Cuts, posed: Posed, norm: Array, tighter: float, ceil
         y, z = answer.y, answer.z
         seconds, used = seconds + time.perf_counter() - began, used + max(answer.iterations, 1)
     raise SolverFailed(backend.name, f"limits still broken after {ROUNDS} rounds")
+
+
+def _same(program: BandedQP) -> BandedQP:
+    return program
 
 
 def _sharpened(
@@ -130,9 +135,9 @@ def _with_cones(cuts: Cuts, program: BandedQP, gap: NDArray[np.int64], u: Array,
     )
 
 
-def _fastest(posed: Posed, y: Array, norm: Array) -> tuple[NDArray[np.int64], Array]:
+def fastest(posed: Posed, norm: Array, y: Array | None = None) -> tuple[NDArray[np.int64], Array]:
     """Return the gaps on which the norm of the velocity is beyond its bound, and where on them it is largest."""
-    motion = posed.motion(y)
+    motion = posed.motion(np.zeros(posed.statement.size) if y is None else y)
     slope = differentiated(motion.coefficients, 1) * motion.rates[:, None]
     squared = sum(product(slope[:, :, d : d + 1], slope[:, :, d]) for d in range(motion.dims))
     found = Trajectory(motion.breaks, np.asarray(squared)).extrema(1)

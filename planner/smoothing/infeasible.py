@@ -22,8 +22,9 @@ RELAXATION, STRETCH = 1e-7, 1e-4
 WIDEST, LONGEST = 1e4, 1e3
 #: Limits that press less than this part of the hardest are not told, and of the others so many.
 PRESSES, TOLD = 1e-3, 4
-#: Most unknowns of a statement for which these searches are made.
-SEARCHED = 6000
+#: Most unknowns of a statement for which these searches are made: of joints by themselves, of joints that a tube binds,
+#: and of those that the norm of their velocity binds; and how many limits are tried alone.
+SEARCHED, SEARCHED_BOUND, SEARCHED_CONES, TRIED = 6000, 600, 100, 3
 
 #: A limit, the segment and the side it presses on.
 Key = tuple[int, int, int]
@@ -55,7 +56,8 @@ def explained(posed: Sequence[Posed], at: int, proof: NoPoint, search: Search) -
     stretched alike, let all limits be kept (to 1e-4); either is None where it is not found.
     """
     one = posed[at]
-    small = max(p.statement.size for p in posed) <= SEARCHED
+    size = max(p.statement.size for p in posed)
+    small = size <= (SEARCHED if not one.statement.bound else SEARCHED_BOUND if one.norm is None else SEARCHED_CONES)
     pressing = _pressing(one, proof)
     (limit, segment, side), gap, u = pressing[0]
     if limit < 0:  # the norm
@@ -152,7 +154,7 @@ def _remedied(
     tried: list[tuple[str, int]] = []
     for key, gap, u in pressing:
         whose = (posed.limits.names[key[0]], posed.limits.joints[key[0]]) if key[0] >= 0 else ("", -1)
-        if key[0] < 0 or whose in tried:
+        if key[0] < 0 or whose in tried or len(tried) == TRIED:
             continue
         tried.append(whose)
         same = [w == whose for w in zip(posed.limits.names, posed.limits.joints, strict=True)]

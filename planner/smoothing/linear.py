@@ -21,7 +21,8 @@ class LinearLimits:
     """Limit c bounds the derivative ``orders[c]`` of ``directions[c, i] @ q`` on every gap i, scaled.
 
     ``lower`` and ``upper`` (C, M); ``sizes`` (C, M) is what errors are relative to; ``everywhere`` (C,): on the whole
-    gap, or at its left end alone. ``names`` (C,) and ``joints`` (C,), the caller's, or -1 for several, say what it is.
+    gap, or at its left end alone. ``rounding`` (C,) is how well the quantity is known. ``names`` (C,) and ``joints``
+    (C,), the caller's, or -1 for several, say what it is.
     """
 
     orders: NDArray[np.int64]
@@ -30,6 +31,7 @@ class LinearLimits:
     upper: Array
     sizes: Array
     everywhere: NDArray[np.bool_]
+    rounding: Array
     names: tuple[str, ...]
     joints: tuple[int, ...]
 
@@ -49,15 +51,19 @@ class Scale:
     """How a statement relates to its request.
 
     Its ``joints``; every gap's ``segment`` (M,) and the ``parts`` that a segment has; the units ``second`` s and
-    ``unit``; how well positions are known, ``rounding``.
+    ``unit`` (D,).
     """
 
     joints: tuple[int, ...]
     segment: NDArray[np.int64]
     parts: int
     second: float
-    unit: float
-    rounding: float
+    unit: Array
+
+    def rounding(self, request: PlanRequest) -> Array:
+        """Return how well positions are known, scaled, (D,)."""
+        far = np.abs(request.waypoints[:, list(self.joints)]).max(axis=0)
+        return np.asarray(8 * np.finfo(float).eps * far / self.unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +77,7 @@ class _Limit:
     size: Array
     name: str
     joint: int
+    rounding: float = 0.0
     everywhere: bool = True
 
 
@@ -95,37 +102,38 @@ def linear_limits(request: PlanRequest, order: int, scale: Scale, speed: Array |
         np.stack([f.upper for f in found]) if found else none,
         np.stack([np.where(np.isfinite(f.size), f.size, 1.0) for f in found]) if found else none,
         np.array([f.everywhere for f in found], dtype=bool),
+        np.array([f.rounding for f in found]),
         tuple(f.name for f in found),
         tuple(f.joint for f in found),
     )
 
 
 def _rates(request: PlanRequest, order: int, scale: Scale) -> Iterator[_Limit]:
-    count, eye = request.count - 1, np.eye(len(scale.joints))
+    count, eye, rounding = request.count - 1, np.eye(len(scale.joints)), scale.rounding(request)
     for m in range(min(4, 2 * order)):
         limit = segment_bounds(request.limits, request.segment_limits, m, count, request.dims)
         for d, joint in enumerate(scale.joints):
             offset = request.waypoints[0, joint] if m == 0 else 0.0
-            factor = scale.second**m / scale.unit
+            factor = scale.second**m / scale.unit[d]
             lower, upper = ((x[:, joint] - offset)[scale.segment] * factor for x in (limit.lower, limit.upper))
             if not (np.isfinite(lower).any() or np.isfinite(upper).any()):
                 continue
-            size = _half_width(lower, upper, scale.rounding) if m == 0 else magnitude(lower, upper)
-            yield _Limit(m, eye[d], lower, upper, size, QUANTITIES[m], joint)
+            size = _half_width(lower, upper, rounding[d]) if m == 0 else magnitude(lower, upper)
+            yield _Limit(m, eye[d], lower, upper, size, QUANTITIES[m], joint, float(rounding[d]) if m == 0 else 0.0)
 
 
 def _boxes(request: PlanRequest, tolerance: Array, scale: Scale) -> Iterator[_Limit]:
     """Yield the boxes around interior waypoints: limits at the left ends of their gaps."""
-    eye, gaps = np.eye(len(scale.joints)), len(scale.segment)
+    eye, gaps, rounding = np.eye(len(scale.joints)), len(scale.segment), scale.rounding(request)
     here = np.arange(gaps) % scale.parts == 0
     here[0] = False
     for d, joint in enumerate(scale.joints):
-        width = float(tolerance[joint]) / scale.unit
+        width = float(tolerance[joint]) / float(scale.unit[d])
         if width > 0:
-            middle = (request.waypoints[:-1, joint] - request.waypoints[0, joint])[scale.segment] / scale.unit
+            middle = (request.waypoints[:-1, joint] - request.waypoints[0, joint])[scale.segment] / scale.unit[d]
             lower, upper = np.where(here, middle - width, -np.inf), np.where(here, middle + width, np.inf)
-            size = np.full(gaps, max(width, scale.rounding))
-            yield _Limit(0, eye[d], lower, upper, size, "waypoint_tolerance", joint, everywhere=False)
+            size = np.full(gaps, max(width, rounding[d]))
+            yield _Limit(0, eye[d], lower, upper, size, "waypoint_tolerance", joint, float(rounding[d]), False)
 
 
 def _tube(request: PlanRequest, tube: Array, scale: Scale) -> Iterator[_Limit]:
@@ -133,15 +141,16 @@ def _tube(request: PlanRequest, tube: Array, scale: Scale) -> Iterator[_Limit]:
 
     q is within the box around some point of the line exactly if every two joints are for some common point of it.
     """
-    chosen, segment = list(scale.joints), scale.segment
-    eye = np.eye(len(chosen))
-    points = (request.waypoints[:, chosen] - request.waypoints[0, chosen]) / scale.unit
-    widths = np.maximum(tube[chosen] / scale.unit, NARROWEST * max(1.0, 1.0 / scale.unit))
+    chosen, segment, unit = list(scale.joints), scale.segment, float(scale.unit[0])  # that of all joints
+    eye, rounding = np.eye(len(chosen)), float(scale.rounding(request).max())
+    points = (request.waypoints[:, chosen] - request.waypoints[0, chosen]) / unit
+    widths = np.maximum(tube[chosen] / unit, NARROWEST * max(1.0, 1.0 / unit))
     steps = np.diff(points, axis=0)
     for d, joint in enumerate(scale.joints):
         low = np.minimum(points[:-1, d], points[1:, d]) - widths[d]
         high = np.maximum(points[:-1, d], points[1:, d]) + widths[d]
-        yield _Limit(0, eye[d], low[segment], high[segment], np.full(len(segment), widths[d]), "tube", joint)
+        size = np.full(len(segment), widths[d])
+        yield _Limit(0, eye[d], low[segment], high[segment], size, "tube", joint, rounding)
     for a, b in combinations(range(len(chosen)), 2):
         along = steps[:, b, None] * eye[a] - steps[:, a, None] * eye[b]
         length = np.abs(along).max(axis=1)
@@ -151,7 +160,7 @@ def _tube(request: PlanRequest, tube: Array, scale: Scale) -> Iterator[_Limit]:
         middle = (along * points[:-1]).sum(axis=1)
         lower, upper = np.where(moves, middle - width, -np.inf), np.where(moves, middle + width, np.inf)
         size = np.where(moves, width, 1.0)
-        yield _Limit(0, along[segment], lower[segment], upper[segment], size[segment], "tube", -1)
+        yield _Limit(0, along[segment], lower[segment], upper[segment], size[segment], "tube", -1, 2 * rounding)
 
 
 def _half_width(lower: Array, upper: Array, rounding: float) -> Array:

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.banded_qp import KKTPoint
-
 from ..deadline import Deadline
 from ..errors import InvalidRequest, SolverFailed, Unsupported
 from ..kernels.splines import hermite_states
 from ..solvers import Backend, select
 from ..types import Bound, Note, PlanRequest, Solution, Stats
+from .cones import fastest
+from .evidence import Found, Optimum
 from .infeasible import Search, explained
 from .posing import Posed, given_states, joined, pose
 from .rounds import TIGHTER, Cuts, Kept, NoPoint
@@ -73,7 +73,7 @@ def smoothest(request: PlanRequest, how: Smoothing) -> Solution:
 
 
 class Conflict(Exception):
-    """Limits that cannot be kept: all statements, which of them, and the proof."""
+    """Limits that cannot be kept: the statements that broke any, which of them, and the proof."""
 
     def __init__(self, posed: tuple[Posed, ...], at: int, proof: NoPoint) -> None:
         super().__init__("conflict")
@@ -85,31 +85,61 @@ def _solution(
 ) -> Solution:
     assert request.times is not None
     free = _spline(request, how) if parts == 1 else None
-    found: list[Kept] = []
     try:
-        posed = tuple(_from_free(one, free) for one in pose(request, how.order, how.ends, parts))
-        for one in posed:
-            if one.limited or how.backend != "auto":
-                found.append(kept(one, one.limits, one.norm, backends, deadline))
-            else:
-                found.append(
-                    Kept(np.zeros(one.statement.size), np.zeros(0), one.statement.program(), None, ELIMINATION, 1, 0.0)
-                )
-    except NoPoint as proof:
-        _refuse_uneven(request.times)
-        raise Conflict(posed, len(found), proof) from None
+        whole = _from_free(pose(request, how.order, how.ends, parts, alike=True), free)
+        broken = list(range(request.dims)) if how.backend != "auto" else _broken(whole)
+        if not broken:
+            found = [_free(whole)]
+        elif whole.statement.bound:
+            found = _each([whole], backends, deadline)
+        else:
+            _refuse_uneven(request.times)
+            rest = [d for d in range(request.dims) if d not in broken]
+            some = [_from_free(pose(request, how.order, how.ends, parts, joints), free) for joints in (broken,)]
+            try:
+                found = [Found(some[0], kept(some[0], some[0].limits, None, backends[:1], deadline, giving=False))]
+            except (NoPoint, SolverFailed):  # one by one, to see which
+                some = [_from_free(pose(request, how.order, how.ends, parts, [d]), free) for d in broken]
+                found = _each(some, backends, deadline)
+            if rest:
+                found.append(_free(_from_free(pose(request, how.order, how.ends, parts, rest, alike=True), free)))
     except SolverFailed:
         _refuse_uneven(request.times)  # where a Hessian is singular in double precision
         raise
-    trajectory = joined(posed, [f.y for f in found], request, parts)
-    weights = np.array([one.weight for one in posed])
-    programs, points, multipliers = zip(*((f.program, f.y, f.z) for f in found), strict=True)
-    evidence = KKTPoint(programs, points, multipliers, weights)
-    solved = [f for f in found if f.name != ELIMINATION]
+    trajectory = joined([f.posed for f in found], [f.kept.y for f in found], request, parts)
+    solved = [f.kept for f in found if f.kept.name != ELIMINATION]
     stats = Stats(ELIMINATION)
     if solved:
         stats = Stats(solved[0].name, "solved", sum(f.iterations for f in solved), sum(f.seconds for f in solved))
-    return Solution(trajectory, request.times, stats, bound=Bound("method", evidence))
+    return Solution(trajectory, request.times, stats, bound=Bound("method", Optimum(tuple(found))))
+
+
+def _free(posed: Posed) -> Found:
+    """Return the optimum without limits, from which the unknowns count."""
+    return Found(posed, Kept(np.zeros(posed.statement.size), np.zeros(0), posed.statement.program, ELIMINATION, 1, 0.0))
+
+
+def _broken(posed: Posed) -> list[int]:
+    """Return the joints that break a limit without being held to it; all of them where they are bound."""
+    if not posed.limited:
+        return []
+    rows, worst = Cuts.of(posed, posed.limits, TIGHTER).at(np.zeros(posed.statement.size), 0.0, False)
+    if posed.statement.bound:
+        fast = posed.norm is not None and len(fastest(posed, posed.norm)[0]) > 0
+        return list(posed.joints) if fast or worst > 0.0 else []
+    if worst <= 0.0:
+        return []
+    return sorted({posed.limits.joints[c] for c in rows.place[1]})
+
+
+def _each(posed: Sequence[Posed], backends: Sequence[Backend], deadline: Deadline) -> list[Found]:
+    found: list[Found] = []
+    for one in posed:
+        try:
+            found.append(Found(one, kept(one, one.limits, one.norm, backends, deadline)))
+        except NoPoint as proof:
+            raise Conflict(tuple(posed), len(found), proof) from None
+    return found
 
 
 def _from_free(posed: Posed, free: Array | None) -> Posed:
@@ -123,8 +153,8 @@ def _from_free(posed: Posed, free: Array | None) -> Posed:
     if free is None:
         once = posed.rebased(Cuts.of(posed, posed.limits, TIGHTER).free())
         return once.rebased(Cuts.of(once, posed.limits, TIGHTER).free())  # refined
-    scale = posed.second ** np.arange(1, statement.order) / posed.unit
-    rates = free[:, :, list(posed.joints)] * scale[:, None, None]
+    scale = posed.second ** np.arange(1, statement.order)[:, None] / posed.unit
+    rates = free[:, :, list(posed.joints)] * scale[:, None]
     return posed.rebased(statement.unknowns(np.concatenate([np.zeros((1, *rates.shape[1:])), rates])))
 
 

@@ -1,7 +1,7 @@
-"""From a request at given times to statements: one for each joint, or one for all.
+"""From a request at given times to statements, for all of its joints or some.
 
-That is where a tube or the norm of the velocity binds them, or where nothing is limited. All of it in units in which
-the median gap and the largest range of the statement's joints are one, with positions counted from the first waypoint.
+All of it in units in which the median gap and each joint's range are one, with positions counted from the first
+waypoint; where a tube or the norm of the velocity binds the joints, their largest range is the unit of all.
 """
 
 from collections.abc import Sequence
@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 class Posed:
     """A statement with its limits; ``joints`` are the caller's, ``times`` (M + 1,) and ``segment`` (M,) of the nodes.
 
-    ``second`` s and ``unit`` undo the scaling; ``origin`` (D,) is where positions count from; ``norm`` (M,) bounds the
-    Euclidean norm of the velocity; ``rounding`` is how well positions are known.
+    ``second`` s and ``unit`` (D,) undo the scaling; ``origin`` (D,) is where positions count from; ``norm`` (M,) bounds
+    the Euclidean norm of the velocity.
     """
 
     statement: MinimumDerivative
@@ -35,15 +35,14 @@ class Posed:
     times: Array
     segment: NDArray[np.int64]
     second: float
-    unit: float
+    unit: Array
     origin: Array
-    rounding: float
     norm: Array | None = None
 
     @property
-    def weight(self) -> float:
-        """What a cost in scaled units is worth in the caller's."""
-        return float(self.unit**2 / self.second ** (2 * self.statement.order - 1))
+    def weights(self) -> Array:
+        """What a cost in scaled units is worth in the caller's, (D,)."""
+        return np.asarray(self.unit**2 / self.second ** (2 * self.statement.order - 1))
 
     @cached_property
     def limited(self) -> bool:
@@ -64,41 +63,51 @@ class Posed:
 
     def physical(self, limit: int, value: float) -> float:
         """Return a value of a limited quantity in the caller's units."""
-        order = int(self.limits.orders[limit])
-        offset = 0.0
-        if order == 0:
-            along = self.limits.directions[limit, 0]
-            offset = float(along @ self.origin)
-        return float(value * self.unit / self.second**order + offset)
+        order, joint = int(self.limits.orders[limit]), self.limits.joints[limit]
+        unit = self.unit[self.joints.index(joint) if joint >= 0 else 0]
+        offset = self.limits.directions[limit, 0] @ self.origin if order == 0 else 0.0
+        return float(value * unit / self.second**order + offset)
 
     def clock(self, gap: int, u: float) -> float:
         """Return the caller's time at a place in [0, 1] on a gap."""
         return float(self.times[gap] + u * (self.times[gap + 1] - self.times[gap]))
 
 
-def pose(request: PlanRequest, order: int, ends: str, parts: int) -> tuple[Posed, ...]:
-    """Return the statements of a request with times, with ``parts`` pieces between waypoints.
+def pose(
+    request: PlanRequest, order: int, ends: str, parts: int, joints: Sequence[int] | None = None, alike: bool = False
+) -> Posed:
+    """Return the statement of a request with times, with ``parts`` pieces between waypoints.
 
     ``ends``: ``fixed`` takes the request's end states (a NaN or a missing one is free), ``free`` none, ``periodic``
-    makes the last derivatives the first.
+    makes the last derivatives the first. ``joints`` are those wanted, by default all; ``alike``: in the same unit.
     """
     assert request.times is not None
-    bound = request.tube is not None or _norms(request) is not None
-    whole = bound or not _limited(request)
-    groups = [tuple(range(request.dims))] if whole else [(d,) for d in range(request.dims)]
+    chosen = list(range(request.dims)) if joints is None else list(joints)
+    norm = _norms(request)
+    bound = len(chosen) > 1 and (request.tube is not None or norm is not None)
+    times, reference = nodes(request, parts)
+    segment = np.repeat(np.arange(request.count - 1), parts)
+    second = float(np.median(np.diff(request.times)))
+    unit = _ranges(request)[chosen]
+    if alike or bound:
+        unit = np.full(len(chosen), unit.max())
+    states = given_states(request, order, ends, parts)[:, :, chosen]
+    states = states * (second ** np.arange(order)[:, None] / unit)[:, None]
+    origin = request.waypoints[0, chosen]
+    placed = (reference[:, chosen] - origin) / unit
+    statement = MinimumDerivative(np.diff(times) / second, placed, states, ends == "periodic", bound)
+    speed = None if norm is None else norm[segment] * second / unit[0]
+    limits = linear_limits(request, order, Scale(tuple(chosen), segment, parts, second, unit), None if bound else speed)
+    own = speed if bound else None
+    return Posed(statement, limits, tuple(chosen), times, segment, second, unit, origin, own)
+
+
+def _ranges(request: PlanRequest) -> Array:
+    """Return what each joint's positions are scaled by, (D,): their range, or what they may be off."""
     span = np.ptp(request.waypoints, axis=0)
     if request.waypoint_tolerance is not None:
         span = np.maximum(span, request.waypoint_tolerance)
-    span = np.where(span > 0, span, max(float(span.max()), 1.0))
-    return tuple(
-        _group(request, order, ends, parts, joints, float(span[list(joints)].max()), bound) for joints in groups
-    )
-
-
-def _limited(request: PlanRequest) -> bool:
-    own = any(s is not None and s.given() for s in request.segment_limits or ())
-    boxes = request.waypoint_tolerance is not None and bool((request.waypoint_tolerance > 0).any())
-    return own or boxes or bool(request.limits.given())
+    return np.asarray(np.where(span > 0, span, span.max() if span.max() > 0 else 1.0))
 
 
 def nodes(request: PlanRequest, parts: int) -> tuple[Array, Array]:
@@ -114,29 +123,6 @@ def nodes(request: PlanRequest, parts: int) -> tuple[Array, Array]:
         for x in (request.times, request.waypoints)
     ]
     return tuple(np.concatenate([s[:, :-1].reshape(-1, *s.shape[2:]), s[-1:, -1]]) for s in split)  # type: ignore[return-value]
-
-
-def _group(
-    request: PlanRequest, order: int, ends: str, parts: int, joints: tuple[int, ...], unit: float, bound: bool
-) -> Posed:
-    times, reference = nodes(request, parts)
-    assert request.times is not None
-    second = float(np.median(np.diff(request.times)))
-    chosen = list(joints)
-    origin = request.waypoints[0, chosen]
-    states = given_states(request, order, ends, parts)[:, :, chosen]
-    scale = second ** np.arange(order) / unit
-    states = states * scale[:, None, None]
-    reference = (reference[:, chosen] - origin) / unit
-    statement = MinimumDerivative(np.diff(times) / second, reference, states, ends == "periodic", bound)
-    segment = np.repeat(np.arange(request.count - 1), parts)
-    rounding = 8 * np.finfo(float).eps * float(np.abs(request.waypoints).max()) / unit
-    norm = _norms(request)
-    norm = None if norm is None else norm[segment] * second / unit
-    units = Scale(joints, segment, parts, second, unit, rounding)
-    limits = linear_limits(request, order, units, norm if len(joints) == 1 else None)
-    norm = None if len(joints) == 1 else norm
-    return Posed(statement, limits, joints, times, segment, second, unit, origin, rounding, norm)
 
 
 def given_states(request: PlanRequest, order: int, ends: str, parts: int) -> Array:
@@ -175,7 +161,7 @@ def joined(posed: Sequence[Posed], points: Sequence[Array], request: PlanRequest
     states = np.empty((order - 1, *reference.shape))
     positions = reference.copy()
     for one, y in zip(posed, points, strict=True):
-        filled = one.statement.filled(y) * (one.unit / one.second ** np.arange(order))[:, None, None]
+        filled = one.statement.filled(y) * (one.unit / one.second ** np.arange(order)[:, None])[:, None]
         chosen = list(one.joints)
         positions[:, chosen] += filled[0]
         states[:, :, chosen] = filled[1:]

@@ -5,8 +5,9 @@ that there is none. Limits are tightened a little, so that what comes out keeps 
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from .posing import Posed
 Array = NDArray[np.float64]
 
 #: Limits are tightened by this part of their size, so that what comes out keeps them strictly.
-TIGHTER = 1e-9
+TIGHTER = 1e-10
 #: And where a waypoint or a given state already touches a limit: how far rounding may go.
 ROUNDING = 1e-9
 ROUNDS = 60
@@ -36,8 +37,10 @@ MOST = 100
 CURVED = 0.1
 #: Extrema at least this close to breaking a limit get a row along with those that do, once rows are curved.
 NEAR = 1e-6
-#: Accuracy of the last program, and of the first ones.
-FINE, COARSE = 1e-11, 1e-4
+#: Rows broken by no more than this before they are kept will not move by much.
+SETTLED = 1e-6
+#: Accuracy of the last program, of those before it, and of the first.
+FINE, MIDDLE, COARSE = 1e-11, 1e-9, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +75,7 @@ class Kept:
 
     y: Array
     z: Array
-    program: BandedQP
-    rows: Rows | None
+    program: Callable[[], BandedQP]
     name: str
     iterations: int
     seconds: float
@@ -181,29 +183,23 @@ def _bounds(posed: Posed, limits: LinearLimits, tighter: float) -> Array:
     """
     margin = tighter * limits.sizes
     if tighter > 0:
-        margin[limits.orders == 0] = np.maximum(margin[limits.orders == 0], posed.rounding)
-    states, k = posed.statement.states, posed.statement.order
-    points = posed.statement.reference + states[0]
-    found = np.empty((4, *limits.lower.shape))
-    for c, m in enumerate(limits.orders):
-        values = points if m == 0 else states[m] if m < k else np.full_like(points, np.nan)
-        along = limits.directions[c]
-        room = np.full((2, len(along)), np.inf)
-        for node in (values[:-1], values[1:]) if limits.everywhere[c] else (values[:-1],):
-            at = np.where(along != 0, along * node, 0.0).sum(axis=1)
-            room = np.fmin(room, np.stack([at - limits.lower[c], limits.upper[c] - at]))
-        own = np.clip(0.5 * room, 0.0, margin[c]) if tighter >= 0 else np.tile(margin[c], (2, 1))
-        touching = own <= ROUNDING * margin[c]
-        accept = np.where(touching, -ROUNDING * limits.sizes[c], 0.5 * own)
-        if tighter < 0:
-            accept = 1.5 * own
-        found[:, c] = (
-            limits.lower[c] + own[0],
-            limits.upper[c] - own[1],
-            limits.lower[c] + accept[0],
-            limits.upper[c] - accept[1],
-        )
-    return found
+        margin = np.maximum(margin, limits.rounding[:, None])
+    given = np.full((4, *posed.statement.reference.shape), np.nan)
+    given[: posed.statement.order] = posed.statement.states[:4]
+    given[0] += posed.statement.reference
+    along = limits.directions
+    room = np.full((2, *limits.lower.shape), np.inf)
+    for nodes, counts in ((given[:, :-1], True), (given[:, 1:], limits.everywhere[:, None])):
+        at = np.where(along != 0, along * nodes[limits.orders], 0.0).sum(axis=2)
+        at = np.where(counts, at, np.nan)
+        room = np.fmin(room, np.stack([at - limits.lower, limits.upper - at]))
+    if tighter >= 0:
+        own = np.clip(0.5 * room, 0.0, margin)
+        accept = np.where(own <= ROUNDING * margin, -ROUNDING * limits.sizes, 0.5 * own)
+    else:
+        own, accept = np.stack([margin, margin]), np.stack([1.5 * margin, 1.5 * margin])
+    sides = [limits.lower + own[0], limits.upper - own[1], limits.lower + accept[0], limits.upper - accept[1]]
+    return np.stack(sides)
 
 
 def kept_within(cuts: Cuts, backend: Backend, ceiling: float, deadline: Deadline, optimal: bool = True) -> Kept:
@@ -226,18 +222,20 @@ def kept_within(cuts: Cuts, backend: Backend, ceiling: float, deadline: Deadline
     fine, worst = True, 0.0
     for _ in range(ROUNDS):
         curved = own and rows is not None and worst < CURVED
-        found, worst = cuts.at(y, float(np.clip(10.0 * worst, NEAR, 0.01)) if curved else 0.0, curved)
+        before, near = worst, float(np.clip(10.0 * worst, NEAR, 0.01)) if curved else 0.0
+        found, worst = cuts.at(y, near, curved)
         if worst <= 0.0 and (fine or not optimal):
-            rows = found if rows is None else rows
-            return Kept(y, z, cuts.program(rows, own=True), rows, backend.name, used, seconds)
-        fine = not own or worst <= 0.0  # kept: now once more at the present places, without second-order terms
+            last = found if rows is None else rows
+            return Kept(y, z, partial(cuts.program, last, own=True), backend.name, used, seconds)
+        # kept, by a motion near the last: now once more at the present places, without second-order terms
+        fine = not own or (worst <= 0.0 and before <= SETTLED)
         both = found if rows is None else rows.straight().and_(found)
         rows = both.straight() if fine else both
         if not len(y):
             raise NoPoint(rows, np.ones(len(rows.u)), True)
         left, began = deadline.left(), time.perf_counter()
         if own:
-            accuracy = FINE if fine else float(np.clip(1e-3 * worst, FINE, COARSE))
+            accuracy = FINE if fine else float(np.clip(1e-3 * worst, MIDDLE, COARSE))
             y, z, iterations = _solved(cuts, rows, y, accuracy, ceiling)
         else:
             try:

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.banded_qp import KKTPoint
 from problems.free_times import Stationary
 
 from ..deadline import Deadline
@@ -13,6 +12,7 @@ from ..errors import Infeasible, InvalidRequest, SolverFailed, TimeLimit
 from ..limits import QUANTITIES, Boundary, segment_bounds
 from ..trajectory import Trajectory
 from ..types import Bound, Minimised, PlanRequest, Solution, Stats
+from .evidence import Optimum
 from .free_times import FreeTimes, optimal_times
 from .least_duration import optimal_times_within
 from .minimum_jerk import Smoothing, smoothest
@@ -81,10 +81,10 @@ def _at(
         trajectory = Trajectory.from_states(times, request.waypoints, np.ascontiguousarray(found.states))
         return Solution(trajectory, times, stats, minimised=minimised)
     bound = None
-    if free and not limited and inner.bound is not None and isinstance(inner.bound.evidence, KKTPoint):
+    if free and not limited and inner.bound is not None and isinstance(inner.bound.evidence, Optimum):
         rates = np.stack([inner.trajectory(times, m) for m in range(1, how.order)])
         states = np.concatenate([request.waypoints[None], rates])
-        evidence = Stationary(np.diff(times), states, minimised.time_weight, inner.bound.evidence)
+        evidence = Stationary(np.diff(times), states, minimised.time_weight, inner.bound.evidence.point)
         bound = Bound("method", evidence)
     return Solution(inner.trajectory, times, stats, bound=bound, minimised=minimised)
 

@@ -27,13 +27,15 @@ def kept(
     backends: Sequence[Backend],
     deadline: Deadline,
     optimal: bool = True,
+    giving: bool = True,
 ) -> Kept:
     """Return the optimum within limits (the posed statement's, or others of the same kind).
 
     Unless ``optimal``: some motion that the first two back ends find within them.
 
     The first two back ends are asked with the limits tightened a little; where that proves nothing, the first and then
-    the others with limits as they may give. The statement's unknowns are to count from the optimum without limits.
+    the others with limits as they may give, if ``giving``. The statement's unknowns are to count from the optimum
+    without limits.
 
     Raises
     ------
@@ -46,7 +48,7 @@ def kept(
     ceiling = most_cost(posed.statement, limits, norm)
     first = backends[0]
     attempts = [(backend, backend.precision) for backend in backends[:2]]
-    if optimal:
+    if optimal and giving:
         attempts += [(first, margin) for margin in GIVING]
         attempts += [(other, GIVING[-1]) for other in backends[1:]]
     last: NoPoint | SolverFailed | None = None

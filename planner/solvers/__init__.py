@@ -64,7 +64,7 @@ def _ipopt(tolerance: float, limit: float | None) -> dict[str, Any]:
 
 
 BACKENDS: tuple[Backend, ...] = (
-    Backend("interior_point", ("qp",), "numba", _own),
+    Backend("interior_point", ("qp",), "numba", _own, precision=1e-10),
     Backend("clarabel", ("qp", "cone"), "clarabel", _clarabel),
     Backend("piqp", ("qp",), "piqp", _piqp),
     Backend("daqp", ("qp",), "daqp", _daqp, most=500),
