@@ -3,9 +3,10 @@
 import csv
 import os
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -13,16 +14,22 @@ from typing import Any
 from planner import __version__
 
 from .cases import GROUPS
-from .kernels import JOINTS, Figure
+from .figures import JOINTS, Figure
+from .markdown import number, table
+from .minimum_jerk.growth import draw
+from .minimum_jerk.rounds import Standing
+from .minimum_jerk.tables import section
 from .rows import Row
 from .service import PARTS, Split
 
-PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig")
+PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig", "spline-trajectory")
+PACKAGES += ("qpsolvers", "piqp", "clarabel", "osqp", "daqp")
 
 INTRODUCTION = """# Benchmarks
 
 Our methods beside the documented calls of toppra (its quick start), ruckig (offline: one calculation a segment, from
-rest to rest) and scipy, on the same problems. Made by `make bench`.
+rest to rest) and scipy, on the same problems; minimum jerk also beside spline-trajectory, IPOPT and solvers of
+quadratic programs. Made by `make bench`.
 
 - **Certified**: the answer keeps everything asked (limits, waypoints, rest at the ends) to 1e-6 relative, judged by our
   verification at the exact extrema of the pieces. A peer's answer is taken over piece by piece, not sampled. A peer
@@ -37,7 +44,8 @@ rest to rest) and scipy, on the same problems. Made by `make bench`.
 
 KERNELS = f"""Single calls, one thread, process time, ours and the peer's in turn; results are compared before they are
 timed. Ours are the calls that users make, with all their checks, unless a kernel is named. Curves have {JOINTS} joints,
-uneven times and random waypoints; ours come as pieces, while `make_interp_spline` leaves B-spline coefficients.
+uneven times and random waypoints; ours come as pieces, while `make_interp_spline` leaves B-spline coefficients. The
+quintic spline is under *Minimum jerk*.
 
 - **Ratio**: the peer's time over ours, median of the rounds; the *goal* is the least it should be.
 - **ns an item**: our time by sample, piece or waypoint. **Growth**: the same over that of the smallest N; 1 is linear.
@@ -47,18 +55,28 @@ uneven times and random waypoints; ours come as pieces, while `make_interp_splin
 SUMMARY = "Above 1: slower than the first peer, in the last column worse than the best known.\n"
 
 
-def write(rows: Sequence[Row], figures: Sequence[Figure], splits: Sequence[Split], out: Path) -> Path:
-    """Write ``rows.csv``, ``kernels.csv``, ``service.csv`` and ``report.md`` to a folder; return the report's path."""
+def write(
+    rows: Sequence[Row],
+    figures: Sequence[Figure],
+    standings: Sequence[Standing],
+    splits: Sequence[Split],
+    out: Path,
+) -> Path:
+    """Write the tables as CSV files, the picture of growth and ``report.md`` to a folder; return the report's path."""
     out.mkdir(parents=True, exist_ok=True)
     _csv(out / "rows.csv", [asdict(r) for r in rows])
     _csv(out / "kernels.csv", [{**asdict(f), "each_ns": f.each_ns, "met": f.met} for f in figures])
+    _csv(out / "minimum_jerk.csv", [{**asdict(s), "each_ns": s.each_ns, "met": s.met} for s in standings])
     _csv(out / "service.csv", [{**asdict(s), "rest": s.rest} for s in splits])
+    draw(standings, out)
     report = out / "report.md"
-    report.write_text(markdown(rows, figures, splits), encoding="utf-8")
+    report.write_text(markdown(rows, figures, standings, splits), encoding="utf-8")
     return report
 
 
-def markdown(rows: Sequence[Row], figures: Sequence[Figure], splits: Sequence[Split]) -> str:
+def markdown(
+    rows: Sequence[Row], figures: Sequence[Figure], standings: Sequence[Standing], splits: Sequence[Split]
+) -> str:
     """Return the report."""
     parts = [INTRODUCTION, machine(), "## Summary\n", SUMMARY, summary(rows)]
     for group, about in GROUPS.items():
@@ -67,6 +85,8 @@ def markdown(rows: Sequence[Row], figures: Sequence[Figure], splits: Sequence[Sp
             parts += [_problem([r for r in rows if r.problem == problem])]
     if figures:
         parts += ["## Kernels and curves\n", KERNELS, _kernels(figures)]
+    if standings:
+        parts += [section(standings)]
     if splits:
         parts += ["## Where a request's time goes\n", _service(splits)]
     return "\n".join(parts)
@@ -75,7 +95,8 @@ def markdown(rows: Sequence[Row], figures: Sequence[Figure], splits: Sequence[Sp
 def machine() -> str:
     """Return what the figures were measured on."""
     system = f"{_processor()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
-    versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    there = [name for name in PACKAGES if find_spec(name.replace("-", "_")) is not None]
+    versions = ", ".join(f"{name} {version(name)}" for name in there)
     return f"Measured on {system}; waywright {__version__}, {versions}.\n"
 
 
@@ -92,8 +113,8 @@ def summary(rows: Sequence[Row]) -> str:
                 group,
                 entry,
                 f"{len(kept)} of {len(mine)}",
-                _number(median(times) if times else None, ".3g"),
-                _number(median(beyond) if beyond else None, ".4f"),
+                number(median(times) if times else None, ".3g"),
+                number(median(beyond) if beyond else None, ".4f"),
             ]
         )
     heads = [
@@ -103,7 +124,7 @@ def summary(rows: Sequence[Row]) -> str:
         "time, x the first peer's (median)",
         "value / best known (median, certified)",
     ]
-    return _table(heads, lines)
+    return table(heads, lines)
 
 
 def _problem(rows: Sequence[Row]) -> str:
@@ -112,18 +133,18 @@ def _problem(rows: Sequence[Row]) -> str:
         [
             r.entry,
             "yes" if r.certified else "**no**",
-            _number(r.duration, ".4f"),
-            _number(r.squared_jerk, ".5g"),
-            *(_number(x, ".4f") for x in (r.velocity, r.acceleration, r.jerk)),
-            _number(r.ms, ".3g"),
-            _number(r.solve_ms, ".3g"),
-            _number(r.time_ratio, ".3g"),
+            number(r.duration, ".4f"),
+            number(r.squared_jerk, ".5g"),
+            *(number(x, ".4f") for x in (r.velocity, r.acceleration, r.jerk)),
+            number(r.ms, ".3g"),
+            number(r.solve_ms, ".3g"),
+            number(r.time_ratio, ".3g"),
             r.why.replace("|", "/"),
         ]
         for r in rows
     ]
     heads = "entry,certified,duration s,squared jerk,velocity,acceleration,jerk,ms,solving,x,what is broken".split(",")
-    return f"### {rows[0].problem}{best}\n\n{_table(heads, lines)}"
+    return f"### {rows[0].problem}{best}\n\n{table(heads, lines)}"
 
 
 def _kernels(figures: Sequence[Figure]) -> str:
@@ -131,20 +152,20 @@ def _kernels(figures: Sequence[Figure]) -> str:
         [
             f.name,
             f.what,
-            _number(f.ours_ms, ".3g"),
+            number(f.ours_ms, ".3g"),
             f.peer,
-            _number(f.peer_ms, ".3g"),
-            _number(f.ratio, ".3g"),
+            number(f.peer_ms, ".3g"),
+            number(f.ratio, ".3g"),
             "" if f.goal is None else f"≥ {f.goal:.3g}",
             "" if f.met is None else "yes" if f.met else "**no**",
-            _number(f.each_ns, ".0f" if (f.each_ns or 0.0) >= 100 else ".3g"),
-            _number(f.growth, ".2f"),
+            number(f.each_ns, ".0f" if (f.each_ns or 0.0) >= 100 else ".3g"),
+            number(f.growth, ".2f"),
             "" if f.difference is None else f"{f.difference:.0e}" + ("" if f.agrees else " **(not timed)**"),
         ]
         for f in figures
     ]
     heads = "call,what,ours ms,peer,peer ms,ratio,goal,met,ns an item,growth,difference".split(",")
-    return _table(heads, lines)
+    return table(heads, lines)
 
 
 def _service(splits: Sequence[Split]) -> str:
@@ -153,20 +174,11 @@ def _service(splits: Sequence[Split]) -> str:
         shares = (f"{100 * getattr(s, part) / s.total:.0f} %" for part in (*PARTS, "rest"))
         lines.append([s.request, s.method, f"{s.total:.2f}", *shares])
     intro = "In process, without a network; *rest* is reading the body, routing and the test's own client.\n\n"
-    return intro + _table(["request", "method", "total ms", *PARTS, "rest"], lines)
+    return intro + table(["request", "method", "total ms", *PARTS, "rest"], lines)
 
 
 def _value(row: Row) -> Any:
     return row.squared_jerk if row.group == "times" else row.duration
-
-
-def _number(value: float | None, form: str) -> str:
-    return "" if value is None else "∞" if value == float("inf") else format(value, form)
-
-
-def _table(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    out = [heads, ["---"] * len(heads), *lines]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in out) + "\n"
 
 
 def _csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:

@@ -52,7 +52,7 @@ STYLE = {
 
 HEAD = """# Gallery
 
-One page for every method, and two beyond: a derivation, a picture, when to use it and when not. Each is a short
+One page for every method, and some beyond: a derivation, a picture, when to use it and when not. Each is a short
 program: run `python examples/plot_<name>.py` to see its figure, or add a file name to save it. What each method takes
 and honours is in [methods.md](methods.md). Made from `examples/plot_*.py` by `make gallery`.
 """

@@ -44,6 +44,7 @@ if TYPE_CHECKING:  # the same names once more, for type checkers; a test holds b
     from .sampling import Samples as Samples
     from .sampling import sample as sample
     from .sampling import sample_count as sample_count
+    from .smoothing.stream import Stream as Stream
     from .trajectory import Trajectory as Trajectory
     from .types import Certificate as Certificate
     from .types import Check as Check
@@ -77,6 +78,7 @@ _HOME = {
     "options": ("MAX_TIME", "MAX_VALUE", "Options", "invalid", "pointer"),
     "planning": ("Plan", "pick", "plan"),
     "sampling": ("Samples", "sample", "sample_count"),
+    "smoothing.stream": ("Stream",),
     "trajectory": ("Trajectory",),
     "types": ("Certificate", "Check", "Note", "Objective", "PlanRequest", "Sampling"),
     "version": ("__version__",),

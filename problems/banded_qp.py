@@ -58,6 +58,15 @@ class BandedQP:
         both = {**above, **{-k: v for k, v in above.items()}}
         return csc_matrix(diags_array(list(both.values()), offsets=list(both), shape=(n, n)))
 
+    def _times(self, y: Array) -> Array:
+        """Return H y."""
+        found = self.bands[-1] * y
+        for t in range(1, min(len(self.bands), len(y))):
+            above = self.bands[-1 - t, t:]
+            found[t:] += above * y[:-t]
+            found[:-t] += above * y[t:]
+        return np.asarray(found)
+
     @cached_property
     def _factors(self) -> Array:
         return np.asarray(cholesky_banded(self.bands))
@@ -67,7 +76,7 @@ class BandedQP:
 
     def value(self, y: Array) -> float:
         """Return the objective at y."""
-        return float(0.5 * y @ (self.hessian() @ y) + self.gradient @ y + self.constant)
+        return float(0.5 * y @ self._times(y) + self.gradient @ y + self.constant)
 
     def free_minimum(self) -> Array:
         """Return the minimiser without the rows, -H^{-1} g."""
@@ -109,7 +118,7 @@ class BandedQP:
         what a Newton step could still save; ``complementarity``: |z's| / F.
         """
         slack = self.upper - self.rows @ y
-        left = self.hessian() @ y + self.gradient + self.rows.T @ z
+        left = self._times(y) + self.gradient + self.rows.T @ z
         out = float(np.maximum(-slack[: len(slack) - sum(self.cones)], 0.0).max(initial=0.0))
         for cone in self._each_cone():
             out = max(out, float(np.linalg.norm(slack[cone.start + 1 : cone.stop]) - slack[cone.start]))

@@ -48,11 +48,10 @@ def triple_integrator(distance: Array, velocity: Array, acceleration: Array, jer
 
 
 @dataclass(frozen=True, eq=False)
-class StopsAtWaypoints:
+class SegmentTimes:
     """The joints' own shortest times on every segment, (S, D), and the least durations asked for the segments, (S,).
 
-    With a stop at every waypoint no segment can be faster than its slowest joint; nor can the whole be shorter than
-    ``total``.
+    No segment can be faster than its slowest joint; nor can the whole be shorter than ``total``.
     """
 
     shortest: Array
@@ -60,5 +59,5 @@ class StopsAtWaypoints:
     total: float
 
     def lower_bound(self) -> float:
-        """Return a duration that no motion which stops at every waypoint can fall below."""
+        """Return a duration that no motion which takes such times can fall below."""
         return max(float(np.maximum(self.shortest.max(axis=1), self.least).sum()), self.total)

@@ -38,6 +38,15 @@ def test_python_snippet(capsys):
     assert out.startswith("ruckig ") and "True" in out and ", 2)" in out
 
 
+def test_corridor_and_free_times_snippets(capsys):
+    exec(compile(PYTHON[2], "README", "exec"), {})
+    rows = capsys.readouterr().out.splitlines()
+    assert [row.split()[0] for row in rows] == ["velocity_norm", "waypoint_tolerance", "tube"]
+    assert all(row.endswith(" True") for row in rows)
+    exec(compile(PYTHON[3], "README", "exec"), {})
+    assert capsys.readouterr().out.rstrip().endswith(" True")
+
+
 def test_client_and_curl_snippets(capsys):
     import httpx2
 

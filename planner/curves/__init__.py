@@ -23,7 +23,7 @@ from .bernstein import (
     subdivided,
 )
 from .cubic import cubic_spline, move
-from .higher import quintic_spline, septic_spline
+from .higher import quintic_pieces, quintic_spline, septic_spline
 from .local_hermite import cubic_hermite, tangents
 from .motion import minimum_jerk_motion, shortest_duration
 from .nurbs_curve import nurbs
@@ -63,6 +63,7 @@ __all__ = [
     "move",
     "nurbs",
     "polynomial",
+    "quintic_pieces",
     "quintic_spline",
     "septic_spline",
     "shortest_duration",

@@ -14,6 +14,7 @@ L-BFGS with a projection: durations may be bounded, and their sum given.
 import numpy as np
 from numba import njit
 
+from .elimination import jerk_states
 from .free_times_energy import energy2, energy3, energy4
 from .splines import hermite_states
 
@@ -51,7 +52,8 @@ def best_energy(h, groups, points, ends, fixed, states, slope, noise):  # type: 
         own = points[n * first : n * last].reshape((n, last - first))
         given = ends[2 * b * first : 2 * b * last].reshape((2, b, last - first))
         nodes = states[b * n * first : b * n * last].reshape((b, n, last - first))
-        if not hermite_states(h, own, given, fixed[g], nodes):
+        quick = b == 2 and fixed[g].all() and jerk_states(h, own, given, np.empty((n, 4)), nodes)
+        if not quick and not hermite_states(h, own, given, fixed[g], nodes):
             return np.inf
         if b == 1:
             total += energy2(h, own, nodes, slope, noise)

@@ -1,1 +1,1 @@
-"""The minimum-derivative pipeline: elimination, cutting planes, infeasibility explained."""
+"""The minimum-derivative pipeline: limits by cutting planes, infeasibility explained, free times, streams."""

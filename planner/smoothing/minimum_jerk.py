@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..deadline import Deadline
 from ..errors import InvalidRequest, SolverFailed, Unsupported
 from ..kernels.splines import hermite_states
+from ..limits import norm_bounds
 from ..solvers import Backend, select
 from ..types import Bound, Note, PlanRequest, Solution, Stats
 from .cones import fastest
@@ -48,13 +49,17 @@ def smoothest(request: PlanRequest, how: Smoothing) -> Solution:
     Raises
     ------
     InvalidRequest
-        Times too uneven for double precision (``out_of_range``).
+        Times too uneven for double precision (``out_of_range``), periodic ends that differ (``not_periodic``), a back
+        end that cannot do it (``conflict``).
+    Unsupported
+        Accelerations at waypoints with order 2, or times and ranges beyond double precision.
     Infeasible
         Nothing of this kind keeps a joint's limits at these times; certified where that is proved, with the smallest
         relaxation and the shortest duration.
     SolverFailed, TimeLimit
     """
     deadline = Deadline(request.timeout)
+    _refuse(request, how)
     backends = select("qp", how.backend)
     tried = PARTS if how.parts is None else (how.parts,)
     for parts in tried:
@@ -179,6 +184,22 @@ def _spline(request: PlanRequest, how: Smoothing) -> Array | None:
     if not hermite_states(h, points - points[0], ends, fixed, states):
         raise Unsupported("minimum_jerk", "precision", reason="these times and ranges leave double precision")
     return states
+
+
+def _refuse(request: PlanRequest, how: Smoothing) -> None:
+    """Raise where the statement cannot say what is asked."""
+    gap = np.abs(request.waypoints[-1] - request.waypoints[0])
+    if how.ends == "periodic" and (gap > 1e-9 * np.maximum(np.ptp(request.waypoints, axis=0), 1e-300)).any():
+        joint = int(np.argmax(gap))
+        raise InvalidRequest.of("/waypoints", "not_periodic", f"joint {joint}: first and last waypoint must be equal")
+    states = request.waypoint_states
+    if how.order == 2 and states is not None and not np.isnan(states.acceleration).all():
+        reason = "order 2 has no acceleration of its own at a waypoint: it may jump there; order 3 takes it"
+        raise Unsupported("minimum_jerk", "waypoint_states", reason=reason)
+    norms = norm_bounds(request.limits, request.segment_limits, request.count - 1)
+    if np.isfinite(norms).any() and request.dims > 1 and how.backend not in ("auto", "clarabel"):
+        reason = "the norm of the velocity is a second-order cone: clarabel takes it"
+        raise InvalidRequest.of("/options/backend", "conflict", reason)
 
 
 def _at_rest(request: PlanRequest, how: Smoothing) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.free_times import Stationary
+from problems.rest_to_rest import SegmentTimes
 
 from ..deadline import Deadline
 from ..errors import Infeasible, InvalidRequest, SolverFailed, TimeLimit
@@ -15,7 +16,7 @@ from ..types import Bound, Minimised, PlanRequest, Solution, Stats
 from .evidence import Optimum
 from .free_times import FreeTimes, optimal_times
 from .least_duration import optimal_times_within
-from .minimum_jerk import Smoothing, smoothest
+from .minimum_jerk import ELIMINATION, Smoothing, smoothest
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,18 @@ def freely_timed(request: PlanRequest, how: Smoothing, time_weight: float | None
     times = np.concatenate([[0.0], np.cumsum(found.h)])
     if request.duration is not None and abs(times[-1] - request.duration.nearest(times[-1])) <= 1e-9 * times[-1]:
         times[-1] = request.duration.nearest(times[-1])
-    return _at(request, how, times, found, minimised, limited, deadline)
+    bound = _slowest_joint(request, lower[1], upper[1]) if weight is None else None
+    return _at(request, how, times, found, minimised, bound, deadline)
+
+
+def _slowest_joint(request: PlanRequest, lower: Array, upper: Array) -> Bound | None:
+    """Return the bound that no joint covers a segment faster than at its largest velocity (S, D), or None."""
+    step = np.diff(request.waypoints, axis=0)
+    shortest = np.where(step > 0, step / upper, step / lower)
+    least = np.array([0.0 if b is None else b.min for b in request.segment_durations or [None] * len(step)])
+    total = 0.0 if request.duration is None else request.duration.min
+    evidence = SegmentTimes(np.maximum(shortest, 0.0), least, total)
+    return Bound("all", evidence) if evidence.lower_bound() > 0 else None
 
 
 def _at(
@@ -65,23 +77,27 @@ def _at(
     times: Array,
     found: FreeTimes,
     minimised: Minimised,
-    limited: bool,
+    bound: Bound | None,
     deadline: Deadline,
 ) -> Solution:
     """Return the smoothest trajectory at the times found; the one found with them where limits leave no other."""
-    stats = Stats("free_times" if not limited else "least_duration", found.status, found.iterations)
+    stats = Stats("free_times" if found.status == "optimal" else "least_duration", found.status, found.iterations)
     free = request.duration is None and request.segment_durations is None and minimised.order > 0
     fixed = replace(request, times=times, duration=None, segment_durations=None, timeout=deadline.left())
     backend = "auto" if how.backend == "ipopt" else how.backend
     try:
         inner = smoothest(fixed, replace(how, parts=1, backend=backend))
     except (Infeasible, InvalidRequest, SolverFailed, TimeLimit):
-        if not limited:
+        if found.status == "optimal":
             raise
         trajectory = Trajectory.from_states(times, request.waypoints, np.ascontiguousarray(found.states))
-        return Solution(trajectory, times, stats, minimised=minimised)
-    bound = None
-    if free and not limited and inner.bound is not None and isinstance(inner.bound.evidence, Optimum):
+        return Solution(trajectory, times, stats, bound=bound, minimised=minimised)
+    if (
+        free
+        and inner.stats.name == ELIMINATION
+        and inner.bound is not None
+        and isinstance(inner.bound.evidence, Optimum)
+    ):
         rates = np.stack([inner.trajectory(times, m) for m in range(1, how.order)])
         states = np.concatenate([request.waypoints[None], rates])
         evidence = Stationary(np.diff(times), states, minimised.time_weight, inner.bound.evidence.point)

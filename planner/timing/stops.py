@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.rest_to_rest import StopsAtWaypoints
+from problems.rest_to_rest import SegmentTimes
 
 from ..errors import Infeasible
 from ..types import Bound, PlanRequest
@@ -82,4 +82,4 @@ def stops_bound(shortest: Array, request: PlanRequest) -> Bound:
     """Return the bound for stops at every waypoint, from the joints' own shortest times on each segment (N - 1, D)."""
     least, _ = segment_bounds_of(request)
     total = 0.0 if request.duration is None else request.duration.min
-    return Bound("method", StopsAtWaypoints(shortest, least, total))
+    return Bound("method", SegmentTimes(shortest, least, total))

@@ -2,13 +2,13 @@
 
 import pytest
 
-from benchmarks import kernels, report
-from benchmarks.kernels import Figure, Task
+from benchmarks import figures, report
+from benchmarks.figures import Figure, Task
 
 
 def test_results_that_differ_are_not_timed():
     task = Task("a", "b", 10, lambda: 1.0, "peer", lambda: 2.0, goal=1.0, difference=lambda a, b: abs(a - b))
-    (figure,) = kernels._measure([task], 2)
+    (figure,) = figures.in_turn([task], 2)
     assert (figure.difference, figure.agrees, figure.ours_ms, figure.met) == (1.0, False, None, False)
     assert "| 1e+00 **(not timed)** |" in report._kernels([figure])
 
@@ -16,7 +16,7 @@ def test_results_that_differ_are_not_timed():
 def test_every_round_calls_both_and_growth_is_by_item():
     called = []
     small = Task("small", "", 1, lambda: called.append("small"), "peer", lambda: called.append("peer"))
-    (first, second) = kernels._measure([small, Task("large", "", 10**6, lambda: called.append("large"))], 2)
+    (first, second) = figures.in_turn([small, Task("large", "", 10**6, lambda: called.append("large"))], 2)
     assert {"small", "peer", "large"} == set(called)
     assert first.rounds == second.rounds == 2
     assert first.growth is None and second.growth < 0.1

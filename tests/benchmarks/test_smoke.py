@@ -3,8 +3,10 @@
 import csv
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -61,7 +63,7 @@ def figures(out):
 def test_all_kernels_and_curves_are_measured_without_goals_for_small_sizes(figures):
     calls = {"sampling", "sampling, over filling", "sampling at random", "sampling every piece"}
     calls |= {"extrema", "extrema, kernel", "verdict", "certificate", "polynomial"}
-    curves = ("cubic_spline", "quintic_spline", "septic_spline", "bspline")
+    curves = ("cubic_spline", "septic_spline", "bspline")
     assert set(figures) == calls | {f"{curve}, N = {count}" for curve in curves for count in ("10^3", "10^4")}
     assert all(float(f["ours_ms"]) > 0 and f["rounds"] == "1" for f in figures.values())
     assert {name for name, f in figures.items() if not f["ratio"]} == {"certificate"}
@@ -78,6 +80,43 @@ def test_the_report_has_a_table_of_kernels(out, figures):
     section = report.partition("## Kernels and curves\n")[2].partition("\n## ")[0]
     told = [line.split(" | ")[0].removeprefix("| ") for line in section.splitlines() if line.startswith("| ")]
     assert told == ["call", "---", *figures]
+
+
+@pytest.fixture(scope="module")
+def standings(out):
+    with (out / "minimum_jerk.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_minimum_jerk_has_its_peers_without_goals_for_small_sizes(standings):
+    entries = {part: {r["entry"] for r in standings if r["part"] == part} for part in {r["part"] for r in standings}}
+    assert {"quintic_spline", "make_interp_spline(k=5)", "PIQP, coefficients"} <= entries["without limits"]
+    assert ("spline-trajectory" in entries["without limits"]) == (find_spec("spline_trajectory") is not None)
+    assert entries["within limits"] == {"smoothest", "plan", "PIQP", "Clarabel", "OSQP, polished", "DAQP"}
+    assert {"optimal_times", "IPOPT"} <= entries["free times"]
+    assert {r["goal"] for r in standings} == {""}
+    assert all(float(r["ms"]) > 0 and r["rounds"] == "1" for r in standings if r["figure"] == "False")
+
+
+def test_minimum_jerk_agrees_with_its_peers(standings):
+    differences = [float(r["difference"]) for r in standings if r["difference"]]
+    assert len(differences) > 10 and max(differences) < 1e-6
+    costs = [float(r["beyond"]) for r in standings if r["part"] == "free times" and r["entry"] == "IPOPT"]
+    assert costs and max(np.abs(costs)) < 1e-8
+
+
+def test_our_limits_hold_where_samples_do_not_and_the_cost_is_the_optimum(standings):
+    limited = {r["entry"]: r for r in standings if r["part"] == "within limits"}
+    for entry in ("smoothest", "plan"):
+        assert -1e-9 < float(limited[entry]["beyond"]) < 1e-6 and float(limited[entry]["violation"]) <= 1e-6
+    for entry in ("PIQP", "Clarabel", "OSQP, polished", "DAQP"):
+        assert float(limited[entry]["beyond"]) == pytest.approx(float(limited["PIQP"]["beyond"]), abs=1e-5)
+        assert 1e-4 < float(limited[entry]["violation"]) < 0.1
+
+
+def test_the_growth_is_drawn(out):
+    assert (out / "growth.png").read_bytes().startswith(b"\x89PNG")
+    assert "## Minimum jerk\n" in (out / "report.md").read_text(encoding="utf-8")
 
 
 def test_the_report_tells_the_machine_and_splits_a_request(out):

@@ -109,8 +109,9 @@ class Sampled:
             )
 
     def _solved(self, hessian, gradient, extra=None):
-        rows, uppers = sparse.vstack(self.rows or [sparse.csr_matrix((0, len(gradient)))]), np.concatenate(
-            self.uppers or [np.zeros(0)]
+        rows, uppers = (
+            sparse.vstack(self.rows or [sparse.csr_matrix((0, len(gradient)))]),
+            np.concatenate(self.uppers or [np.zeros(0)]),
         )
         if extra is not None:
             rows, uppers = extra(rows, uppers)
@@ -282,3 +283,23 @@ def limited():
 def doubtful():
     """Return the function (seed, plan) -> problem that may be infeasible."""
     return make_doubtful
+
+
+@pytest.fixture(scope="session")
+def infeasible_by_samples():
+    """Return whether limits at samples alone, four polynomials per gap, leave no point: by Clarabel, or by how much
+    they would have to give."""
+
+    def judge(problem):
+        for samples in (12, 40, 120):
+            made = problem.sampled(4, samples)
+            try:
+                if made.minimum() is None:
+                    return True
+            except AssertionError:  # Clarabel comes to no end at the edge
+                pass
+            if made.giving() > 1e-8:
+                return True
+        return False
+
+    return judge
