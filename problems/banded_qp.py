@@ -17,7 +17,7 @@ from scipy.sparse import csc_matrix, csr_matrix, diags_array
 
 Array = NDArray[np.float64]
 
-#: Objectives below this part of the Hessian's largest entry (what unknowns of size one cost) are zero but for rounding.
+#: Objectives below this part of what an unknown of size one usually costs are zero but for rounding.
 NOTHING = 1e-9
 #: And these, in the square of rounding, are no evidence that anything costs at all.
 ROUNDING = 1e-20
@@ -68,11 +68,25 @@ class BandedQP:
         return np.asarray(found)
 
     @cached_property
-    def _factors(self) -> Array:
-        return np.asarray(cholesky_banded(self.bands))
+    def _factors(self) -> Array | None:
+        """The Hessian's factors, or None where rounding leaves it indefinite."""
+        try:
+            return np.asarray(cholesky_banded(self.bands))
+        except np.linalg.LinAlgError:
+            return None
 
     def _inverse(self, r: Array) -> Array:
-        return np.asarray(cho_solve_banded((self._factors, False), r)) if len(r) else r
+        """Return H^{-1} r; infinite where rounding leaves H indefinite."""
+        if not len(r):
+            return r
+        if self._factors is None:
+            return np.full(len(r), np.inf)
+        return np.asarray(cho_solve_banded((self._factors, False), r))
+
+    @cached_property
+    def _usual(self) -> float:
+        """What an unknown of size one usually costs: the median of the Hessian's diagonal."""
+        return float(np.median(self.bands[-1])) if self.bands.size else 0.0
 
     def value(self, y: Array) -> float:
         """Return the objective at y."""
@@ -99,11 +113,15 @@ class BandedQP:
         """Return c - 1/2 (g + G'z)' H^{-1} (g + G'z) - h'z: for any z in K no feasible objective is below it."""
         z = self.dual_feasible(z)
         r = self.gradient + self.rows.T @ z
+        if len(r) and self._factors is None:
+            return -float("inf")
         return float(self.constant - 0.5 * r @ self._inverse(r) - self.upper @ z)
 
     def best_dual_value(self, z: Array) -> float:
         """Return the largest dual value of a multiple t z, t >= 0: beyond every bound where z proves infeasibility."""
         z = self.dual_feasible(z)
+        if len(self.gradient) and self._factors is None:
+            return -float("inf")
         push = self.rows.T @ z
         slope = float(-push @ self._inverse(self.gradient) - self.upper @ z)
         if slope <= 0.0:
@@ -122,10 +140,14 @@ class BandedQP:
         out = float(np.maximum(-slack[: len(slack) - sum(self.cones)], 0.0).max(initial=0.0))
         for cone in self._each_cone():
             out = max(out, float(np.linalg.norm(slack[cone.start + 1 : cone.stop]) - slack[cone.start]))
-        size = max(abs(self.value(y)), NOTHING * float(np.abs(self.bands).max(initial=0.0)), 1e-300)
+        size = max(abs(self.value(y)), NOTHING * self._usual, 1e-300)
+        if len(left) and self._factors is None:  # then by the entries alone
+            gradient = float(np.abs(left).max()) / max(float(np.abs(self.rows.T @ z).max()), size)
+        else:
+            gradient = float(np.sqrt(max(left @ self._inverse(left), 0.0) / (2.0 * size)))
         return {
             "primal": out,
-            "dual": float(np.sqrt(max(left @ self._inverse(left), 0.0) / (2.0 * size))),
+            "dual": gradient,
             "complementarity": abs(float(z @ slack)) / size,
         }
 
@@ -161,7 +183,10 @@ class BandedQP:
 
 @dataclass(frozen=True, eq=False)
 class KKTPoint:
-    """A point and multipliers for each of several independent programs, and their weights in the whole objective."""
+    """A point and multipliers for each of several independent programs, and their weights in the whole objective.
+
+    The objectives are sums of squares: none is below zero.
+    """
 
     programs: tuple[BandedQP, ...]
     points: tuple[Array, ...]
@@ -172,9 +197,8 @@ class KKTPoint:
         """Return the weighted sum of the dual values."""
         values = []
         for program, y, z in zip(self.programs, self.points, self.multipliers, strict=True):
-            largest = float(program.bands.max(initial=0.0))
             value = program.dual_value(z) - program.ridge * float(program.bands[-1] @ y**2)  # twice what was added
-            values.append(value if value > ROUNDING * largest else min(value, 0.0))
+            values.append(value if value > ROUNDING * program._usual else 0.0)
         return float(self.weights @ np.array(values))
 
     def residuals(self) -> dict[str, float]:

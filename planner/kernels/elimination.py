@@ -5,7 +5,6 @@ With r = 1 / step, node i has the block [[192 (r³ + r'³), 36 (r'² - r²)], [�
 right of it) and [[168 r'³, -24 r'²], [24 r'², -3 r']] couples it to the next.
 """
 
-import numpy as np
 from numba import njit
 
 #: Neighbouring steps may differ by this factor: the states are then exact to about 1e-13.

@@ -8,8 +8,13 @@ O(n width² + rows). Rows are to be scaled to bounds of about one.
 import numpy as np
 from numba import njit
 
-#: Residuals that pass where rounding stops them above the accuracy asked.
-PASSES = 2e-11
+#: Residuals that pass where rounding slows their fall above the accuracy asked, and where it ends it: there rows are
+#: kept all the same, only the optimum is less exact.
+PASSES, ENDS, KEPT = 2e-11, 1e-7, 1e-11
+#: Costs below this part of their scale are zero but for rounding.
+NOTHING = 1e-6
+#: By what part the diagonal is lifted where rounding leaves the normal matrix indefinite.
+LIFT = 1e-13
 #: What part of the way to the boundary a step goes.
 TO_THE_BOUNDARY = 0.995
 
@@ -173,7 +178,7 @@ def _dual(own, gradient, columns, values, upper, z, work):  # type: ignore[no-un
 
 @njit(cache=True, error_model="numpy")
 def interior_point(  # type: ignore[no-untyped-def]
-    band, own, gradient, columns, values, upper, bends, offsets, kappa, ceiling, scale, accuracy, most, y, z
+    band, own, gradient, columns, values, upper, bends, offsets, kappa, ceiling, least, scale, accuracy, most, y, z
 ):
     """Solve the program.
 
@@ -191,8 +196,10 @@ def interior_point(  # type: ignore[no-untyped-def]
         D, in the columns of G, e and kappa.
     ceiling : float
         Where the dual value, without the objective's constant, rises above this, there is no feasible y.
+    least : float
+        The objective at y = 0, where the unknowns' gradient vanishes. Errors are relative to it plus 1/2 y'Hy.
     scale : float
-        The size of the objective, > 0: what its errors are relative to.
+        A size of the objective to start from, > 0.
     accuracy : float
         Of the residuals, relatively.
     most : int
@@ -212,6 +219,7 @@ def interior_point(  # type: ignore[no-untyped-def]
     s, ds, dz = np.empty(rows), np.empty(rows), np.empty(rows)
     primal, weight, force = np.empty(rows), np.empty(rows), np.empty(rows)
     hy, dual, dy = np.empty(n), np.empty(n), np.empty(n)
+    right, rest = np.empty(n), np.empty(n)
     normal, factors = np.empty_like(band), np.zeros_like(band)
     slopes = values.copy()
     for r in range(rows):
@@ -220,8 +228,9 @@ def interior_point(  # type: ignore[no-untyped-def]
     best, stuck = np.inf, 0
     for iteration in range(most):
         times(band, y, hy)
-        size = 1e-300
+        size, cost = 1e-300, max(least, NOTHING * scale)
         for i in range(n):
+            cost += 0.5 * y[i] * hy[i]
             dual[i] = hy[i] + gradient[i]
             size = max(size, abs(gradient[i]), abs(hy[i]))
         gap = off = 0.0
@@ -243,17 +252,18 @@ def interior_point(  # type: ignore[no-untyped-def]
         for i in range(n):
             left = max(left, abs(dual[i]))
         left /= size
-        if off <= 0.1 * accuracy and left <= 10.0 * accuracy and gap <= accuracy * scale:
+        if off <= 0.1 * accuracy and left <= 10.0 * accuracy and gap <= accuracy * cost:
             return SOLVED, iteration
-        merit = off + left + gap / scale
+        merit = off + left + gap / cost
         if merit < 0.5 * best:
             best, stuck = merit, 0
         else:
             stuck += 1
-        good = off <= PASSES and left <= 10.0 * PASSES and gap <= PASSES * scale
-        if good and stuck >= 3:  # as far as rounding allows
+        good = off <= PASSES and left <= 10.0 * PASSES and gap <= PASSES * cost
+        fair = off <= KEPT and left <= ENDS and gap <= ENDS * cost
+        if (good and stuck >= 3) or (fair and stuck >= 10):  # as far as rounding allows
             return SOLVED, iteration
-        if iteration >= 8 and not good and (stuck >= 3 or iteration % 8 == 0):
+        if iteration >= 8 and not fair and (stuck >= 3 or iteration % 8 == 0):
             if _dual(own, gradient, columns, values, upper, z, dy) > ceiling:
                 return INFEASIBLE, iteration
             if stuck >= 12:
@@ -269,7 +279,10 @@ def interior_point(  # type: ignore[no-untyped-def]
         for r in range(rows):
             weight[r] = z[r] / s[r]
         if not factor(normal, factors):
-            break
+            for i in range(n):  # rounding: lifted a little
+                normal[i, 0] *= 1.0 + LIFT
+            if not factor(normal, factors):
+                return SOLVED if fair else STALLED, iteration
         target = step = 0.0
         for phase in range(2):
             for i in range(n):
@@ -281,7 +294,15 @@ def interior_point(  # type: ignore[no-untyped-def]
                 for a in range(wide):
                     if columns[r, a] >= 0:
                         dy[columns[r, a]] -= slopes[r, a] * force[r]
+            right[:] = dy
             substitute(factors, dy)
+            for _ in range(2 if stuck > 0 else 0):  # refined
+                times(normal, dy, rest)
+                for i in range(n):
+                    rest[i] = right[i] - rest[i]
+                substitute(factors, rest)
+                for i in range(n):
+                    dy[i] += rest[i]
             step = 1.0 if phase == 0 else 1.0 / TO_THE_BOUNDARY
             for r in range(rows):
                 move = _dot(columns, slopes, r, dy)
@@ -298,7 +319,7 @@ def interior_point(  # type: ignore[no-untyped-def]
                 target = mu * (max(after, 0.0) / gap) ** 3
         step *= TO_THE_BOUNDARY
         if not (step > 0.0 and np.isfinite(dy).all()):
-            break
+            return SOLVED if fair else STALLED, iteration
         for i in range(n):
             y[i] += step * dy[i]
         for r in range(rows):

@@ -51,8 +51,8 @@ class MinimumJerkOptions(Spaced):
             raise Conflict("time_weight counts with free_times only")
         if not self.free_times and self.backend == "ipopt":
             raise Conflict("ipopt solves for free_times only")
-        if self.free_times and self.ends == "periodic":
-            raise Conflict("free_times does not take periodic ends")
+        if self.free_times and self.ends != "fixed":
+            raise Conflict("free_times takes fixed ends only: others may let the times go to nothing")
         if self.free_times and self.sub_segments not in (None, 1):
             raise Conflict("free_times takes one polynomial per gap")
         return self

@@ -48,7 +48,7 @@ def kept_within_norm(cuts: Cuts, posed: Posed, norm: Array, tighter: float, ceil
             sharp, z = _sharpened(cuts, program, y, z, gap, u, norm)
             return Kept(y, z, partial(_same, sharp), backend.name, used, seconds)
         if not len(y):
-            raise NoPoint(found, np.ones(len(found.u)), bool(len(found.u)))
+            raise NoPoint(found, np.ones(len(found.u)), True, (fast, where, np.ones(len(fast))))
         rows = found if turn == 0 else rows.and_(found)
         gap, u = np.append(gap, fast), np.append(u, where)
         left, began = deadline.left(), time.perf_counter()
@@ -103,7 +103,7 @@ def _no_point(
     cuts: Cuts, rows: Rows, gap: NDArray[np.int64], u: Array, norm: Array, z: Array | None, ceiling: float
 ) -> NoPoint:
     if z is None:
-        return NoPoint(rows, np.ones(len(rows.u)), False)
+        return NoPoint(rows, np.ones(len(rows.u)), False, (gap, u, np.ones(len(gap))))
     program = _with_cones(cuts, cuts.program(rows, own=True), gap, u, norm)
     return NoPoint(rows, z[: len(rows.u)], program.best_dual_value(z) > ceiling, (gap, u, z[len(rows.u) :]))
 

@@ -144,11 +144,33 @@ class Nodes:
             free = energy(h, np.zeros_like(self.ends))
             if weight > 0.0 and 0.0 < free < np.inf:
                 h *= ((2 * k - 1) * free / (weight * float(h.sum()))) ** (0.5 / k)
-            for shorter in (1.0, 0.3, 0.1, 0.01) if self.ends.any() else (1.0,):
-                value = energy(shorter * h, self.ends) + weight * shorter * float(h.sum())
+            starts = [shorter * h for shorter in ((1.0, 0.3, 0.1, 0.01) if self.ends.any() else (1.0,))]
+            speed = self.speed()
+            if speed > 0.0:  # steadily, as fast as at the ends
+                starts.append(steps * (self.length(steps) / speed))
+            for start in starts:
+                value = energy(start, self.ends) + weight * float(start.sum())
                 if value < lowest:
-                    best, lowest = shorter * h, value
+                    best, lowest = start, value
         return best
+
+    def speed(self) -> float:
+        """Return the largest speed given at an end, over all joints."""
+        found = [0.0, 0.0]
+        size = 2 * (self.order - 1)
+        for i, j in _pairs(self.groups):
+            ends = self.ends[size * i : size * j].reshape(2, self.order - 1, j - i)
+            for side in range(2):
+                found[side] += float((ends[side, 0] ** 2).sum())
+        return float(max(found) ** 0.5)
+
+    def length(self, steps: Array) -> float:
+        """Return the waypoints' mean distance over the mean of ``steps``."""
+        total = np.zeros(self.count - 1)
+        for i, j in _pairs(self.groups):
+            points = self.points[self.count * i : self.count * j].reshape(self.count, j - i)
+            total += (np.diff(points, axis=0) ** 2).sum(axis=1)
+        return float(np.sqrt(total).mean() / steps.mean())
 
     def room(self) -> Array:
         """Return an array for node states."""

@@ -9,22 +9,22 @@ from numpy.typing import NDArray
 from ..deadline import Deadline
 from ..errors import Infeasible, SolverFailed, TimeLimit
 from ..solvers import Backend
-from .linear import LinearLimits
-from .posing import Posed
+from .linear import WIDTHS, LinearLimits
+from .posing import Posed, digits
 from .rounds import NoPoint
 from .within import kept
 
 Array = NDArray[np.float64]
 
-#: To this part the smallest relaxation and the shortest duration are found.
-RELAXATION, STRETCH = 1e-7, 1e-4
+#: To this part the smallest relaxation and the shortest duration are found, and both where a norm is limited.
+RELAXATION, STRETCH, BY_NORM = 1e-7, 1e-4, 1e-3
 #: No limit is asked to give by more than so many sizes, no motion to take more than so many times as long.
 WIDEST, LONGEST = 1e4, 1e3
 #: Limits that press less than this part of the hardest are not told, and of the others so many.
 PRESSES, TOLD = 1e-3, 4
 #: Most unknowns of a statement for which these searches are made: of joints by themselves, of joints that a tube binds,
 #: and of those that the norm of their velocity binds; and how many limits are tried alone.
-SEARCHED, SEARCHED_BOUND, SEARCHED_CONES, TRIED = 6000, 600, 100, 3
+SEARCHED, SEARCHED_BOUND, SEARCHED_CONES, TRIED = 6000, 600, 40, 3
 
 #: A limit, the segment and the side it presses on.
 Key = tuple[int, int, int]
@@ -42,7 +42,7 @@ class Search:
     def keeps(self, posed: Posed, limits: LinearLimits, norm: Array | None) -> bool:
         """Return whether a motion within such limits is found."""
         try:
-            kept(posed, limits, norm, self.backends[:1], self.deadline, optimal=False)
+            kept(posed, limits, norm, self.backends[:2], self.deadline, optimal=False)
         except (NoPoint, SolverFailed):
             return False
         return True
@@ -63,20 +63,17 @@ def explained(posed: Sequence[Posed], at: int, proof: NoPoint, search: Search) -
     if limit < 0:  # the norm
         return _norm_refused(posed, at, proof, search, segment, one.clock(gap, u), small)
     limits = one.limits
-    part, remedy = None, ""
+    part, remedy, every = None, "", np.ones(len(limits.names), dtype=bool)
     if small:
         (limit, segment, side), gap, u, part = _remedied(one, pressing, search)
         if part is not None:
             remedy = f"; it would have to give by {100 * part:.4g} %"
-        elif (all_of := _relaxation(one, np.ones(len(limits.names), dtype=bool), search)) is not None:
+        elif (all_of := _relaxation(one, every, every, search)) is not None:
             remedy = f"; all of its limits would have to give, by {100 * all_of:.4g} %"
     name, joint = limits.names[limit], limits.joints[limit]
-    bound = float((limits.upper if side > 0 else limits.lower)[limit, gap])
-    needed = None
-    if part is not None:
-        needed = one.physical(limit, bound + side * part * float(limits.sizes[limit, gap]))
-    others = [key for key, *_ in pressing if key != (limit, segment, side)]
-    names = [f"{limits.names[c] if c >= 0 else 'velocity_norm'} on segment {s}" for c, s, _ in others]
+    bound, needed = _told_values(one, limit, gap, side, part)
+    others = dict.fromkeys(key[:2] for key, *_ in pressing if key[:2] != (limit, segment))
+    names = [f"{limits.names[c] if c >= 0 else 'velocity_norm'} on segment {s}" for c, s in others]
     against = f", against {', '.join(names[:TOLD])}" if names else ""
     whose = f"of joint {joint}" if joint >= 0 else "that bind its joints"
     return Infeasible(
@@ -86,7 +83,7 @@ def explained(posed: Sequence[Posed], at: int, proof: NoPoint, search: Search) -
         quantity=name,
         segment=segment,
         time=one.clock(gap, u),
-        bound=one.physical(limit, bound),
+        bound=bound,
         needed=needed,
         minimum_duration=_duration(posed, search) if small else None,
         certified=proof.proved,
@@ -99,13 +96,13 @@ def _norm_refused(
     one = posed[at]
     assert one.norm is not None
     gap = int(np.flatnonzero(one.segment == segment)[0])
-    speed, needed = one.unit / one.second, None
+    speed, needed = float(one.unit[0]) / one.second, None
 
     def enough(part: float) -> bool:
         assert one.norm is not None
         return search.keeps(one, one.limits, one.norm * (1.0 + part))
 
-    if small and (found := _least(enough, 0.0, 1e-3, WIDEST, 1e-5, search)) is not None:
+    if small and (found := _least(enough, 0.0, 1e-3, WIDEST, BY_NORM)) is not None:
         needed = float(one.norm[gap] * (1.0 + found) * speed)
     return Infeasible(
         f"{_family(search)} cannot keep the limits: that of the velocity's norm presses most, on segment {segment}"
@@ -113,7 +110,7 @@ def _norm_refused(
         quantity="velocity_norm",
         segment=segment,
         time=time,
-        bound=float(one.norm[gap] * speed),
+        bound=digits(one.norm[gap] * speed),
         needed=needed,
         minimum_duration=_duration(posed, search) if small else None,
         certified=proof.proved,
@@ -151,25 +148,46 @@ def _remedied(
     posed: Posed, pressing: Sequence[tuple[Key, int, float]], search: Search
 ) -> tuple[Key, int, float, float | None]:
     """Return the hardest pressing limit that alone can help, and by how much it must give; else the hardest, None."""
-    tried: list[tuple[str, int]] = []
+    tried: list[bytes] = []
     for key, gap, u in pressing:
-        whose = (posed.limits.names[key[0]], posed.limits.joints[key[0]]) if key[0] >= 0 else ("", -1)
-        if key[0] < 0 or whose in tried or len(tried) == TRIED:
+        if key[0] < 0 or len(tried) == TRIED:
             continue
-        tried.append(whose)
-        same = [w == whose for w in zip(posed.limits.names, posed.limits.joints, strict=True)]
-        if (part := _relaxation(posed, np.array(same), search)) is not None:
+        sides = posed.limits.alike(key[0], key[2])
+        if (same := np.stack(sides).tobytes()) in tried:
+            continue
+        tried.append(same)
+        if (part := _relaxation(posed, *sides, search)) is not None:
             return key, gap, u, part
     return (*pressing[0], None)
 
 
-def _relaxation(posed: Posed, which: NDArray[np.bool_], search: Search) -> float | None:
-    """Return the least part by which these limits must give for the others to be kept; None if that cannot help."""
+def _told_values(posed: Posed, limit: int, gap: int, side: int, part: float | None) -> tuple[float, float | None]:
+    """Return the bound in the caller's terms, and what it must be where it has to give by a part of its size."""
+    limits = posed.limits
+    if limits.names[limit] in WIDTHS:
+        own = limit
+        if limits.joints[limit] < 0:  # of two joints the one that moves less: its width counts more
+            other = posed.joints[int(np.argmax(np.abs(limits.directions[limit, gap])))]
+            own = next(c for c, n in enumerate(limits.names) if n == limits.names[limit] and limits.joints[c] == other)
+        unit = posed.unit[posed.joints.index(limits.joints[own])]
+        width = float(limits.sizes[own, gap] * unit)
+        return digits(width), None if part is None else digits(width * (1.0 + part))
+    bound = float((limits.upper if side > 0 else limits.lower)[limit, gap])
+    bounded = posed.physical(limit, bound)
+    if part is None:
+        return bounded, None
+    return bounded, posed.physical(limit, bound + side * part * float(limits.sizes[limit, gap]))
+
+
+def _relaxation(posed: Posed, below: NDArray[np.bool_], above: NDArray[np.bool_], search: Search) -> float | None:
+    """Return the least part by which these sides must give for the others to be kept; None if that cannot help."""
 
     def enough(part: float) -> bool:
-        return search.keeps(posed, posed.limits.widened(np.where(which, part, 0.0)), posed.norm)
+        return search.keeps(
+            posed, posed.limits.widened(np.where(below, part, 0.0), np.where(above, part, 0.0)), posed.norm
+        )
 
-    return _least(enough, 0.0, 1e-3, WIDEST, RELAXATION, search)
+    return _least(enough, 0.0, 1e-3, WIDEST, RELAXATION)
 
 
 def _duration(posed: Sequence[Posed], search: Search) -> float | None:
@@ -183,18 +201,19 @@ def _duration(posed: Sequence[Posed], search: Search) -> float | None:
             norm = None if one.norm is None else one.norm * factor
             return search.keeps(one, one.limits.slowed(factor), norm)
 
-        if enough(longest):
-            continue
-        factor = _least(enough, longest, longest, LONGEST, STRETCH, search)
+        try:
+            if enough(longest):
+                continue
+        except TimeLimit:
+            return None
+        factor = _least(enough, longest, longest, LONGEST, STRETCH if one.norm is None else BY_NORM)
         if factor is None:
             return None
         longest = factor
     return float(longest * (posed[0].times[-1] - posed[0].times[0]))
 
 
-def _least(
-    enough: Callable[[float], bool], low: float, step: float, most: float, accuracy: float, search: Search
-) -> float | None:
+def _least(enough: Callable[[float], bool], low: float, step: float, most: float, accuracy: float) -> float | None:
     """Return the least x above ``low`` that is enough, to an accuracy and from above; None if ``most`` is not.
 
     None too where the time runs out.

@@ -57,7 +57,10 @@ def optimal_times_within(
     bounds = Durations.of(count, duration, segment_durations)
     _refuse_given(points, start, end, lower, upper)
     moving = (points[1:] != points[:-1]).any(axis=1)
-    limited = np.isfinite(lower[1:]).any(axis=(0, 2)) | np.isfinite(upper[1:]).any(axis=(0, 2)) | (bounds.low > 0)
+    step = np.diff(points, axis=0)
+    ahead = np.where(step > 0, np.isfinite(upper[1]), np.isfinite(lower[1])) & (step != 0)
+    bent = np.isfinite(lower[2:]).any(axis=0) | np.isfinite(upper[2:]).any(axis=0)
+    limited = (ahead | (bent & (step != 0))).any(axis=1) | (bounds.low > 0)
     if time_weight is None and (moving & ~limited).any():
         i = int(np.argmax(moving & ~limited))
         raise InvalidRequest.of("/limits", "missing", f"nothing limits the speed on segment {i}: no duration is least")

@@ -12,6 +12,8 @@ from ..types import PlanRequest
 
 Array = NDArray[np.float64]
 
+#: What the caller gives by its half-width.
+WIDTHS = ("tube", "waypoint_tolerance")
 #: A tube narrower than this, relative to what errors of positions are, leaves no room for rounding: it is widened.
 NARROWEST = 2e-7
 
@@ -35,10 +37,22 @@ class LinearLimits:
     names: tuple[str, ...]
     joints: tuple[int, ...]
 
-    def widened(self, by: Array) -> "LinearLimits":
-        """Return the limits, each given by so many of its sizes, (C,)."""
-        room = by[:, None] * self.sizes
-        return replace(self, lower=self.lower - room, upper=self.upper + room)
+    def widened(self, below: Array, above: Array) -> "LinearLimits":
+        """Return the limits, their lower and upper sides given by so many of their sizes, (C,) each."""
+        low, high = below[:, None] * self.sizes, above[:, None] * self.sizes
+        return replace(self, lower=self.lower - low, upper=self.upper + high)
+
+    def alike(self, limit: int, side: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which lower and upper sides, (C,) each, the caller names by the same number as this one's.
+
+        That is one side of a quantity and joint; both where they are symmetric, or a width; of a tube all joints.
+        """
+        name, joint = self.names[limit], self.joints[limit]
+        wide = name in WIDTHS
+        same = [n == name and (j == joint or name == "tube") for n, j in zip(self.names, self.joints, strict=True)]
+        which = np.array(same, dtype=bool)
+        both = wide or bool((self.lower[limit] == -self.upper[limit]).all() and self.orders[limit] > 0)
+        return which & (both or side < 0), which & (both or side > 0)
 
     def slowed(self, factor: float) -> "LinearLimits":
         """Return what the limits become, at the same times, for a motion that takes ``factor`` times as long."""

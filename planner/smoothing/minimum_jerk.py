@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deadline import Deadline
-from ..errors import InvalidRequest, SolverFailed, Unsupported
+from ..errors import Infeasible, InvalidRequest, SolverFailed, Unsupported
 from ..kernels.splines import hermite_states
 from ..limits import norm_bounds
 from ..solvers import Backend, select
@@ -64,8 +64,18 @@ def smoothest(request: PlanRequest, how: Smoothing) -> Solution:
     tried = PARTS if how.parts is None else (how.parts,)
     for parts in tried:
         try:
-            solution = _solution(request, how, parts, backends, deadline)
+            solution = at_times(request, how, parts, backends, deadline)
+        except SolverFailed as failed:
+            if parts == tried[-1]:
+                raise Infeasible(
+                    f"no motion within the limits is found ({failed}); that there is none is not proved"
+                ) from None
+            continue
         except Conflict as conflict:
+            if how.backend != "auto" and not conflict.proof.proved:
+                raise Infeasible(
+                    f"{how.backend} finds no motion within the limits; that there is none is not proved"
+                ) from None
             if parts == tried[-1]:
                 search = Search(backends, deadline, parts, _at_rest(request, how))
                 raise explained(conflict.posed, conflict.at, conflict.proof, search) from None
@@ -85,9 +95,18 @@ class Conflict(Exception):
         self.posed, self.at, self.proof = posed, at, proof
 
 
-def _solution(
+def at_times(
     request: PlanRequest, how: Smoothing, parts: int, backends: Sequence[Backend], deadline: Deadline
 ) -> Solution:
+    """Return the smoothest trajectory with so many polynomials per gap.
+
+    Raises
+    ------
+    Conflict
+        The limits cannot be kept, or no back end can.
+    InvalidRequest, Unsupported, SolverFailed, TimeLimit
+        As for ``smoothest``.
+    """
     assert request.times is not None
     free = _spline(request, how) if parts == 1 else None
     try:
@@ -100,7 +119,7 @@ def _solution(
         else:
             _refuse_uneven(request.times)
             rest = [d for d in range(request.dims) if d not in broken]
-            some = [_from_free(pose(request, how.order, how.ends, parts, joints), free) for joints in (broken,)]
+            some = [_from_free(pose(request, how.order, how.ends, parts, broken), free)]
             try:
                 found = [Found(some[0], kept(some[0], some[0].limits, None, backends[:1], deadline, giving=False))]
             except (NoPoint, SolverFailed):  # one by one, to see which
@@ -116,7 +135,10 @@ def _solution(
     stats = Stats(ELIMINATION)
     if solved:
         stats = Stats(solved[0].name, "solved", sum(f.iterations for f in solved), sum(f.seconds for f in solved))
-    return Solution(trajectory, request.times, stats, bound=Bound("method", Optimum(tuple(found))))
+    gave = max(f.kept.gave for f in found)
+    message = f"the limits leave no room: they are kept to {gave:g} of their sizes only"
+    notes = (Note("limits_widened", message),) if gave > 0 else ()
+    return Solution(trajectory, request.times, stats, bound=Bound("method", Optimum(tuple(found))), notes=notes)
 
 
 def _free(posed: Posed) -> Found:
@@ -193,6 +215,12 @@ def _refuse(request: PlanRequest, how: Smoothing) -> None:
         joint = int(np.argmax(gap))
         raise InvalidRequest.of("/waypoints", "not_periodic", f"joint {joint}: first and last waypoint must be equal")
     states = request.waypoint_states
+    if how.ends == "periodic" and states is not None:
+        for name in ("velocity", "acceleration"):
+            values = getattr(states, name)
+            if (np.abs(values[0] - values[-1]) > 0).any():
+                reason = f"with periodic ends the {name} is the same at the first and the last waypoint"
+                raise InvalidRequest.of("/waypoint_states", "conflict", reason)
     if how.order == 2 and states is not None and not np.isnan(states.acceleration).all():
         reason = "order 2 has no acceleration of its own at a waypoint: it may jump there; order 3 takes it"
         raise Unsupported("minimum_jerk", "waypoint_states", reason=reason)

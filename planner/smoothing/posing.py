@@ -66,11 +66,16 @@ class Posed:
         order, joint = int(self.limits.orders[limit]), self.limits.joints[limit]
         unit = self.unit[self.joints.index(joint) if joint >= 0 else 0]
         offset = self.limits.directions[limit, 0] @ self.origin if order == 0 else 0.0
-        return float(value * unit / self.second**order + offset)
+        return digits(value * unit / self.second**order + offset)
 
     def clock(self, gap: int, u: float) -> float:
         """Return the caller's time at a place in [0, 1] on a gap."""
         return float(self.times[gap] + u * (self.times[gap + 1] - self.times[gap]))
+
+
+def digits(value: float) -> float:
+    """Return a number without the last digits, which scaling forth and back leaves to rounding."""
+    return float(f"{float(value):.14g}")
 
 
 def pose(

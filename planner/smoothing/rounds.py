@@ -71,7 +71,10 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """The optimum within limits: unknowns, the program with the limits as asked, its multipliers, and what it took."""
+    """The optimum within limits: unknowns, the program with the limits as asked, its multipliers, and what it took.
+
+    ``gave``: by what part of their sizes limits were let give for it.
+    """
 
     y: Array
     z: Array
@@ -79,6 +82,7 @@ class Kept:
     name: str
     iterations: int
     seconds: float
+    gave: float = 0.0
 
 
 class NoPoint(Exception):
@@ -151,9 +155,9 @@ class Cuts:
         return Rows(*rows), float(worst)
 
     @cached_property
-    def largest(self) -> float:
-        """What the Hessian makes of states of size one: where the optimum without limits costs nothing, a scale."""
-        return float(self.band[:, 0].max(initial=0.0))
+    def usual(self) -> float:
+        """What a state of size one usually costs: where the optimum without limits costs nothing, a scale."""
+        return float(np.median(self.band[:, 0])) if len(self.band) else 0.0
 
     def free(self) -> Array:
         """Return the optimum without limits."""
@@ -219,9 +223,10 @@ def kept_within(cuts: Cuts, backend: Backend, ceiling: float, deadline: Deadline
     y = np.zeros(cuts.statement.size)
     z, seconds, used = np.zeros(0), 0.0, 0
     rows: Rows | None = None
-    fine, worst = True, 0.0
+    fine, bent, worst = True, True, 0.0
     for _ in range(ROUNDS):
-        curved = own and rows is not None and worst < CURVED
+        curved = own and bent and rows is not None and worst < CURVED
+        bent = True
         before, near = worst, float(np.clip(10.0 * worst, NEAR, 0.01)) if curved else 0.0
         found, worst = cuts.at(y, near, curved)
         if worst <= 0.0 and (fine or not optimal):
@@ -236,7 +241,13 @@ def kept_within(cuts: Cuts, backend: Backend, ceiling: float, deadline: Deadline
         left, began = deadline.left(), time.perf_counter()
         if own:
             accuracy = FINE if fine else float(np.clip(1e-3 * worst, MIDDLE, COARSE))
-            y, z, iterations = _solved(cuts, rows, y, accuracy, ceiling)
+            try:
+                y, z, iterations = _solved(cuts, rows, y, accuracy, ceiling)
+            except NoPoint as none:
+                if none.proved or not rows.kappa.any():
+                    raise
+                bent, rows = False, rows.straight()  # an extremum that moves far is not where its parabola is
+                y, z, iterations = _solved(cuts, rows, y, accuracy, ceiling)
         else:
             try:
                 answer = solve_qp(cuts.program(rows, own=False), backend, left)
@@ -251,11 +262,13 @@ def _solved(cuts: Cuts, rows: Rows, y: Array, accuracy: float, ceiling: float) -
     from ..kernels.interior_point import INFEASIBLE, STALLED, interior_point
 
     statement, z = cuts.statement, np.empty(len(rows.u))
-    size = max(statement.constant, 1e-9 * cuts.largest, 1e-300)
+    size = max(statement.constant, 1e-3 * cuts.usual, 1e-300)
     program = (cuts.band, cuts.factors, statement.gradient)
     table = (rows.columns, rows.values, rows.upper, rows.bends, rows.offsets, rows.kappa)
     y = y.copy()
-    status, iterations = interior_point(*program, *table, ceiling - statement.constant, size, accuracy, MOST, y, z)
+    status, iterations = interior_point(
+        *program, *table, ceiling - statement.constant, statement.constant, size, accuracy, MOST, y, z
+    )
     if status in (INFEASIBLE, STALLED):
         raise _judged(cuts, rows, z, ceiling)
     return y, z, iterations

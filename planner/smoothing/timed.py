@@ -9,14 +9,15 @@ from problems.free_times import Stationary
 from problems.rest_to_rest import SegmentTimes
 
 from ..deadline import Deadline
-from ..errors import Infeasible, InvalidRequest, SolverFailed, TimeLimit
-from ..limits import QUANTITIES, Boundary, segment_bounds
+from ..errors import Infeasible, InvalidRequest, SolverFailed, Unsupported
+from ..limits import QUANTITIES, Boundary, magnitude, segment_bounds
+from ..solvers import select
 from ..trajectory import Trajectory
-from ..types import Bound, Minimised, PlanRequest, Solution, Stats
+from ..types import TOLERANCE, Bound, Minimised, PlanRequest, Solution, Stats
 from .evidence import Optimum
 from .free_times import FreeTimes, optimal_times
 from .least_duration import optimal_times_within
-from .minimum_jerk import ELIMINATION, Smoothing, smoothest
+from .minimum_jerk import ELIMINATION, Conflict, Smoothing, at_times
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,9 @@ def freely_timed(request: PlanRequest, how: Smoothing, time_weight: float | None
     lower, upper = (np.stack([getattr(b, side) for b in bounds]) for side in ("lower", "upper"))
     asked = (request.duration, request.segment_durations, deadline)
     limited = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
+    if how.backend == "ipopt" and not limited:
+        raise InvalidRequest.of("/options/backend", "conflict", "ipopt is for free times within limits: there are none")
+    _refuse_short(request, lower[1], upper[1])
     weight = time_weight if limited or time_weight is not None else TIME_WEIGHT
     if limited:
         backend = how.backend if how.backend == "ipopt" else "auto"
@@ -58,7 +62,7 @@ def freely_timed(request: PlanRequest, how: Smoothing, time_weight: float | None
     if request.duration is not None and abs(times[-1] - request.duration.nearest(times[-1])) <= 1e-9 * times[-1]:
         times[-1] = request.duration.nearest(times[-1])
     bound = _slowest_joint(request, lower[1], upper[1]) if weight is None else None
-    return _at(request, how, times, found, minimised, bound, deadline)
+    return _at(request, how, times, found, minimised, bound, (lower, upper), deadline)
 
 
 def _slowest_joint(request: PlanRequest, lower: Array, upper: Array) -> Bound | None:
@@ -78,19 +82,22 @@ def _at(
     found: FreeTimes,
     minimised: Minimised,
     bound: Bound | None,
+    sides: tuple[Array, Array],
     deadline: Deadline,
 ) -> Solution:
     """Return the smoothest trajectory at the times found; the one found with them where limits leave no other."""
-    stats = Stats("free_times" if found.status == "optimal" else "least_duration", found.status, found.iterations)
+    stats = Stats("free_times" if found.status == "optimal" else found.status, "solved", found.iterations)
     free = request.duration is None and request.segment_durations is None and minimised.order > 0
     fixed = replace(request, times=times, duration=None, segment_durations=None, timeout=deadline.left())
     backend = "auto" if how.backend == "ipopt" else how.backend
     try:
-        inner = smoothest(fixed, replace(how, parts=1, backend=backend))
-    except (Infeasible, InvalidRequest, SolverFailed, TimeLimit):
-        if found.status == "optimal":
-            raise
+        inner = at_times(fixed, how, 1, select("qp", backend), deadline)
+    except (Conflict, InvalidRequest, Unsupported, SolverFailed):
         trajectory = Trajectory.from_states(times, request.waypoints, np.ascontiguousarray(found.states))
+        if not _keeps(trajectory, *sides):
+            raise Infeasible(
+                "no times are found at which the limits can be kept; that there are none is not proved"
+            ) from None
         return Solution(trajectory, times, stats, bound=bound, minimised=minimised)
     if (
         free
@@ -103,6 +110,43 @@ def _at(
         evidence = Stationary(np.diff(times), states, minimised.time_weight, inner.bound.evidence.point)
         bound = Bound("method", evidence)
     return Solution(inner.trajectory, times, stats, bound=bound, minimised=minimised)
+
+
+def _keeps(trajectory: Trajectory, lower: Array, upper: Array) -> bool:
+    """Return whether the limits (4, M, D) of the gaps are kept, to what verification calls that."""
+    found = trajectory.extrema(4)
+    slack = TOLERANCE * magnitude(lower, upper)
+    return bool((found.high <= upper + slack).all() and (found.low >= lower - slack).all())
+
+
+def _refuse_short(request: PlanRequest, lower: Array, upper: Array) -> None:
+    """Raise Infeasible where a segment, or the whole, may not take as long as its velocity limits need."""
+    step = np.diff(request.waypoints, axis=0)
+    least = np.maximum(np.where(step > 0, step / upper, step / lower), 0.0)  # (M, D)
+    bounds = [np.inf if b is None else b.max for b in request.segment_durations or [None] * len(step)]
+    for i, most in enumerate(bounds):
+        joint = int(np.argmax(least[i]))
+        if least[i, joint] > most * (1 + TOLERANCE):
+            needed = float(np.abs(step[i, joint]) / most)
+            raise Infeasible(
+                f"joint {joint} cannot cover segment {i} within {most:g} s at its velocity limit",
+                joint=joint,
+                quantity="velocity",
+                segment=i,
+                bound=float((upper if step[i, joint] > 0 else lower)[i, joint]),
+                needed=needed if step[i, joint] > 0 else -needed,
+                minimum_duration=float(least[i, joint]),
+                certified=True,
+            )
+    total = float(least.max(axis=1).sum())
+    if request.duration is not None and total > request.duration.max * (1 + TOLERANCE):
+        raise Infeasible(
+            f"the velocity limits alone need {total:.6g} s",
+            quantity="duration",
+            bound=request.duration.max,
+            minimum_duration=total,
+            certified=True,
+        )
 
 
 def _given(side: Boundary, order: int, dims: int) -> Array:

@@ -1,6 +1,7 @@
 """The optimum of a posed statement within its limits: which back end, and how strictly."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +57,10 @@ def kept(
         cuts = Cuts.of(posed, limits, margin)
         try:
             if norm is not None:
-                return kept_within_norm(cuts, posed, norm, margin, ceiling, deadline)
-            return kept_within(cuts, backend, ceiling, deadline, optimal)
+                found = kept_within_norm(cuts, posed, norm, margin, ceiling, deadline)
+            else:
+                found = kept_within(cuts, backend, ceiling, deadline, optimal)
+            return replace(found, gave=max(-margin, 0.0))
         except NoPoint as proof:
             last = proof
             if proof.proved:

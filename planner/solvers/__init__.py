@@ -6,6 +6,7 @@ the one before comes to no end. What ran is in the answer's ``solver.name``.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 from typing import Any
 
@@ -31,7 +32,12 @@ class Backend:
     @property
     def available(self) -> bool:
         """Whether the module is installed; asked without importing it."""
-        return find_spec(self.module) is not None
+        return _installed(self.module)
+
+
+@cache
+def _installed(module: str) -> bool:
+    return find_spec(module) is not None
 
 
 def _own(tolerance: float, limit: float | None) -> dict[str, Any]:
