@@ -13,6 +13,8 @@ from numba import njit
 PASSES, ENDS, KEPT = 2e-11, 1e-7, 1e-11
 #: Costs below this part of their scale are zero but for rounding.
 NOTHING = 1e-6
+#: Rounding of a product with the Hessian, relative to its largest term.
+NOISE = 16 * 2.2e-16
 #: By what part the diagonal is lifted where rounding leaves the normal matrix indefinite.
 LIFT = 1e-13
 #: What part of the way to the boundary a step goes.
@@ -178,7 +180,23 @@ def _dual(own, gradient, columns, values, upper, z, work):  # type: ignore[no-un
 
 @njit(cache=True, error_model="numpy")
 def interior_point(  # type: ignore[no-untyped-def]
-    band, own, gradient, columns, values, upper, bends, offsets, kappa, ceiling, least, scale, accuracy, most, y, z
+    band,
+    own,
+    gradient,
+    columns,
+    values,
+    upper,
+    bends,
+    offsets,
+    kappa,
+    ceiling,
+    least,
+    scale,
+    push,
+    accuracy,
+    most,
+    y,
+    z,
 ):
     """Solve the program.
 
@@ -199,7 +217,10 @@ def interior_point(  # type: ignore[no-untyped-def]
     least : float
         The objective at y = 0, where the unknowns' gradient vanishes. Errors are relative to it plus 1/2 y'Hy.
     scale : float
-        A size of the objective to start from, > 0.
+        A size of the objective, > 0.
+    push : float
+        What each row's slack times multiplier is at first, in those: where the optimum costs much more than ``scale``,
+        small ones stall.
     accuracy : float
         Of the residuals, relatively.
     most : int
@@ -222,15 +243,22 @@ def interior_point(  # type: ignore[no-untyped-def]
     right, rest = np.empty(n), np.empty(n)
     normal, factors = np.empty_like(band), np.zeros_like(band)
     slopes = values.copy()
+    far = 0.1
     for r in range(rows):
-        s[r] = max(upper[r] - _dot(columns, values, r, y), 0.1)
-        z[r] = 0.05 * scale / s[r]
+        s[r] = upper[r] - _dot(columns, values, r, y)
+        far = max(far, -s[r])
+    for r in range(rows):
+        s[r] = max(s[r], far)
+        z[r] = push * scale / s[r]
     best, stuck = np.inf, 0
     for iteration in range(most):
         times(band, y, hy)
         size, cost = 1e-300, max(least, NOTHING * scale)
+        pulled = worth = 0.0  # what is only known to rounding, of the gradient and of the cost
         for i in range(n):
             cost += 0.5 * y[i] * hy[i]
+            pulled = max(pulled, NOISE * band[i, 0] * abs(y[i]))
+            worth += NOISE * band[i, 0] * y[i] * y[i]
             dual[i] = hy[i] + gradient[i]
             size = max(size, abs(gradient[i]), abs(hy[i]))
         gap = off = 0.0
@@ -251,16 +279,17 @@ def interior_point(  # type: ignore[no-untyped-def]
         left = 0.0
         for i in range(n):
             left = max(left, abs(dual[i]))
-        left /= size
-        if off <= 0.1 * accuracy and left <= 10.0 * accuracy and gap <= accuracy * cost:
+        left = max(left - pulled, 0.0) / size
+        exact = max(gap - worth, 0.0) / cost
+        if off <= 0.1 * accuracy and left <= 10.0 * accuracy and exact <= accuracy:
             return SOLVED, iteration
         merit = off + left + gap / cost
         if merit < 0.5 * best:
             best, stuck = merit, 0
         else:
             stuck += 1
-        good = off <= PASSES and left <= 10.0 * PASSES and gap <= PASSES * cost
-        fair = off <= KEPT and left <= ENDS and gap <= ENDS * cost
+        good = off <= PASSES and left <= 10.0 * PASSES and exact <= PASSES
+        fair = off <= KEPT and left <= ENDS and exact <= ENDS
         if (good and stuck >= 3) or (fair and stuck >= 10):  # as far as rounding allows
             return SOLVED, iteration
         if iteration >= 8 and not fair and (stuck >= 3 or iteration % 8 == 0):

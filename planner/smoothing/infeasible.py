@@ -42,7 +42,8 @@ class Search:
     def keeps(self, posed: Posed, limits: LinearLimits, norm: Array | None) -> bool:
         """Return whether a motion within such limits is found."""
         try:
-            kept(posed, limits, norm, self.backends[:2], self.deadline, optimal=False)
+            tried = 1 if posed.statement.bound else 2
+            kept(posed, limits, norm, self.backends[:tried], self.deadline, optimal=False)
         except (NoPoint, SolverFailed):
             return False
         return True

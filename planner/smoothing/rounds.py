@@ -33,6 +33,8 @@ ROUNDING = 1e-9
 ROUNDS = 60
 #: Iterations of the interior point at most.
 MOST = 100
+#: With what slacks times multipliers it begins, in units of the cost; the next where it stalls.
+PUSHES = (1.0, 1e4, 1e8)
 #: Below this excess the rows get their second-order terms.
 CURVED = 0.1
 #: Extrema at least this close to breaking a limit get a row along with those that do, once rows are curved.
@@ -265,13 +267,17 @@ def _solved(cuts: Cuts, rows: Rows, y: Array, accuracy: float, ceiling: float) -
     size = max(statement.constant, 1e-3 * cuts.usual, 1e-300)
     program = (cuts.band, cuts.factors, statement.gradient)
     table = (rows.columns, rows.values, rows.upper, rows.bends, rows.offsets, rows.kappa)
-    y = y.copy()
-    status, iterations = interior_point(
-        *program, *table, ceiling - statement.constant, statement.constant, size, accuracy, MOST, y, z
-    )
-    if status in (INFEASIBLE, STALLED):
-        raise _judged(cuts, rows, z, ceiling)
-    return y, z, iterations
+    worth = (ceiling - statement.constant, statement.constant, size)
+    used = 0
+    for push in PUSHES:
+        found = y.copy()
+        status, iterations = interior_point(*program, *table, *worth, push, accuracy, MOST, found, z)
+        used += iterations
+        if status == INFEASIBLE:
+            break
+        if status != STALLED:
+            return found, z, used
+    raise _judged(cuts, rows, z, ceiling)
 
 
 def _judged(cuts: Cuts, rows: Rows, z: Array | None, ceiling: float) -> NoPoint:

@@ -124,7 +124,7 @@ def _own(problem: BandedQP, backend: Backend, time_limit: float | None) -> tuple
     size = max(abs(problem.value(y)), 1e-6 * abs(problem.constant), 1e-300)
     table = (columns, values, problem.upper, np.zeros_like(values), none, none)
     status, iterations = interior_point(
-        band, factors, problem.gradient, *table, np.inf, size, size, 0.1 * ASKED, 100, y, z
+        band, factors, problem.gradient, *table, np.inf, size, size, 1.0, 0.1 * ASKED, 100, y, z
     )
     if status != SOLVED:
         raise NoSolution(backend.name, "the residuals do not pass")

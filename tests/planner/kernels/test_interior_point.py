@@ -52,7 +52,7 @@ def solve(a, gradient, columns, values, upper, bends=None, offsets=None, kappa=N
     none = np.zeros(len(upper))
     curves = (np.zeros_like(values) if bends is None else bends, none if offsets is None else offsets)
     table = (columns, values, upper, *curves, none if kappa is None else kappa)
-    status, iterations = interior_point(a, own, gradient, *table, ceiling, scale, scale, 1e-11, 100, y, z)
+    status, iterations = interior_point(a, own, gradient, *table, ceiling, scale, scale, 1.0, 1e-11, 100, y, z)
     return status, iterations, y, z
 
 
