@@ -106,6 +106,7 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         waypoint_states=original.waypoint_states,
         waypoint_tolerance=original.waypoint_tolerance,
         tube=original.tube,
+        closed=can.continuity if options.closed else 0,
     )
     return Asked(request, demands, kept, still, tuple(notes))
 

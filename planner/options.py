@@ -73,6 +73,11 @@ class Options(BaseModel):
         """Whether the options hold a curve, which may move where all waypoints are equal."""
         return False
 
+    @property
+    def closed(self) -> bool:
+        """Whether the derivatives at the end are those at the start, up to the class the method guarantees."""
+        return False
+
     def check(self, points: NDArray[np.float64]) -> None:
         """Raise InvalidRequest where the options do not fit the waypoints (N, D), which are all equal.
 

@@ -176,7 +176,10 @@ def _names(value: Any, dims: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Demands:
-    """What an answer is held to: the caller's request with its defaults resolved, and nothing of any method."""
+    """What an answer is held to: the caller's request with its defaults resolved, and nothing of any method.
+
+    ``closed``: the derivatives of order 1 to this at the end are to be those at the start.
+    """
 
     dims: int
     limits: Limits = field(default_factory=Limits)
@@ -190,6 +193,7 @@ class Demands:
     waypoint_states: WaypointStates | None = None
     waypoint_tolerance: Array | None = None
     tube: Array | None = None
+    closed: int = 0
 
 
 @dataclass(frozen=True)

@@ -271,6 +271,8 @@ def _waypoint_error(missed: Array | None, demands: Demands, at: Array | None, sp
 def _boundary_error(motion: _Motion, at: Array | None) -> float | None:
     """Return the largest error of a state asked at an end, or at a waypoint (at times ``at``) from either side.
 
+    Where the motion is to be closed, the ends' derivatives are asked of one another.
+
     Relative to max(1, limit, peak) of that derivative and joint.
     """
     demands, errors = motion.demands, []
@@ -281,6 +283,9 @@ def _boundary_error(motion: _Motion, at: Array | None) -> float | None:
             if getattr(boundary, name, None) is not None:
                 left, right = motion.trajectory.ends(order)
                 asked.append((order, getattr(boundary, name), (left if index == 0 else right)[index]))
+    for order in range(1, min(demands.closed, len(QUANTITIES) - 1) + 1):
+        left, right = motion.trajectory.ends(order)
+        asked.append((order, left[0], right[-1]))
     states = demands.waypoint_states
     if states is not None:
         if at is None:

@@ -33,6 +33,11 @@ REQUESTS = {
         "limits": LOOSE,
         "segment_limits": [{"velocity": 3.5}, None, {"acceleration": 19.0}, None, None],
     },
+    "times_segment_velocity": {
+        "waypoints": POINTS,
+        "times": TIMES,
+        "segment_limits": [{"velocity": 3.5}, None, {"acceleration": 19.0}, None, None],
+    },
     "times_duration": {"waypoints": POINTS, "times": TIMES, "duration": {"min": 2, "max": 4}},
     "times_segment_durations": {
         "waypoints": POINTS,

@@ -40,6 +40,11 @@ class CubicSplineOptions(Spaced):
         "pieces, start_conditions takes velocity and acceleration at the start; or a pair [start, end].",
     )
 
+    @property
+    def closed(self) -> bool:
+        """Whether the boundary is periodic."""
+        return self.boundary == "periodic"
+
     def check(self, points: Array) -> None:
         """Raise InvalidRequest where the boundary needs more points."""
         cubic_spline(np.arange(len(points)), points, self.boundary)

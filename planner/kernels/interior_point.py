@@ -250,7 +250,8 @@ def interior_point(  # type: ignore[no-untyped-def]
     for r in range(rows):
         s[r] = max(s[r], far)
         z[r] = push * scale / s[r]
-    best, stuck = np.inf, 0
+    best, stuck, iteration = np.inf, 0, 0
+    kept_y, kept_z, closest = np.empty(n), np.empty(rows), np.inf  # the best so far that would pass
     for iteration in range(most):
         times(band, y, hy)
         size, cost = 1e-300, max(least, NOTHING * scale)
@@ -288,15 +289,16 @@ def interior_point(  # type: ignore[no-untyped-def]
             best, stuck = merit, 0
         else:
             stuck += 1
-        good = off <= PASSES and left <= 10.0 * PASSES and exact <= PASSES
-        fair = off <= KEPT and left <= ENDS and exact <= ENDS
-        if (good and stuck >= 3) or (fair and stuck >= 10):  # as far as rounding allows
-            return SOLVED, iteration
-        if iteration >= 8 and not fair and (stuck >= 3 or iteration % 8 == 0):
+        worst = max(0.1 * left, exact)
+        if off <= KEPT and worst <= ENDS and worst < closest:
+            closest = worst
+            kept_y[:] = y
+            kept_z[:] = z
+        if (closest <= PASSES and stuck >= 3) or stuck >= 12:  # as far as rounding allows
+            break
+        if iteration >= 8 and closest == np.inf and (stuck >= 3 or iteration % 8 == 0):
             if _dual(own, gradient, columns, values, upper, z, dy) > ceiling:
                 return INFEASIBLE, iteration
-            if stuck >= 12:
-                break
         mu = gap / rows
         for r in range(rows):
             weight[r] = z[r] / s[r]
@@ -311,7 +313,7 @@ def interior_point(  # type: ignore[no-untyped-def]
             for i in range(n):  # rounding: lifted a little
                 normal[i, 0] *= 1.0 + LIFT
             if not factor(normal, factors):
-                return SOLVED if fair else STALLED, iteration
+                break
         target = step = 0.0
         for phase in range(2):
             for i in range(n):
@@ -348,12 +350,16 @@ def interior_point(  # type: ignore[no-untyped-def]
                 target = mu * (max(after, 0.0) / gap) ** 3
         step *= TO_THE_BOUNDARY
         if not (step > 0.0 and np.isfinite(dy).all()):
-            return SOLVED if fair else STALLED, iteration
+            break
         for i in range(n):
             y[i] += step * dy[i]
         for r in range(rows):
             s[r] = max(s[r] + step * ds[r], 1e-300)
             z[r] = max(z[r] + step * dz[r], 1e-300)
+    if closest < np.inf:
+        y[:] = kept_y
+        z[:] = kept_z
+        return SOLVED, iteration
     if _dual(own, gradient, columns, values, upper, z, dy) > ceiling:
-        return INFEASIBLE, most
-    return STALLED, most
+        return INFEASIBLE, iteration
+    return STALLED, iteration

@@ -45,6 +45,11 @@ class MinimumJerkOptions(Spaced):
         "these that comes to an end; the norm of the velocity always takes clarabel. ipopt: for free times in limits",
     )
 
+    @property
+    def closed(self) -> bool:
+        """Whether the ends are periodic."""
+        return self.ends == "periodic"
+
     @model_validator(mode="after")
     def _agree(self) -> "MinimumJerkOptions":
         if not self.free_times and self.time_weight is not None:

@@ -75,7 +75,7 @@ class Posed:
 
 def digits(value: float) -> float:
     """Return a number without the last digits, which scaling forth and back leaves to rounding."""
-    return float(f"{float(value):.14g}")
+    return float(f"{float(value):.15g}")
 
 
 def pose(

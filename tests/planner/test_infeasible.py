@@ -50,7 +50,7 @@ STALLS = pytest.mark.xfail(strict=True, reason="the search stalls and takes that
     ("quantity", "order"),
     [
         ("velocity", 2),
-        pytest.param("velocity", 3, marks=STALLS),
+        ("velocity", 3),
         ("velocity", 4),
         ("acceleration", 2),
         ("acceleration", 3),
@@ -65,7 +65,8 @@ def test_what_is_needed_would_do(order, quantity):
     bound = 0.5 * float(peak.peak(("velocity", "acceleration", "jerk").index(quantity) + 1)[0])
     body = {"waypoints": [0, 1, 0.3], "times": TIMES}
     found = refused({**body, "limits": {quantity: bound}}, options)
-    assert found.certified and found.quantity == quantity and found.joint == 0 and abs(found.bound) == bound
+    assert found.certified and found.quantity == quantity and found.joint == 0
+    assert abs(found.bound) == pytest.approx(bound, rel=1e-13)
     assert quantity in found.reason and f"segment {found.segment}" in found.reason
     assert found.segment <= found.time <= found.segment + 1
     assert kept({**body, "limits": {quantity: abs(found.needed) * (1 + 1e-5)}}, options)
@@ -134,7 +135,6 @@ def test_limits_in_conflict_are_named():
     assert "acceleration" in found.reason and "segment" in found.reason
 
 
-@pytest.mark.xfail(strict=True, reason="nothing free (two waypoints): the explanation fails with an IndexError")
 def test_the_norm_refused():
     body = {"waypoints": [[0, 0], [1, 1]], "times": [0, 1], "limits": {"velocity_norm": 1.5}}
     found = refused(body)

@@ -173,7 +173,7 @@ def test_free_ends_are_natural(seed, order):
     for r in range(order, 2 * order - 1):
         size = np.abs(done.trajectory(at, r)).max()
         for end in (times[0], times[-1]):
-            assert np.abs(done.trajectory(end, r)).max() <= 1e-6 * size + 1e-9
+            assert np.abs(done.trajectory(end, r)).max() <= 1e-6 * size + 1e-6
     ends = {s: {"velocity": rng.normal(size=points.shape[1])} for s in ("start", "end")}
     assert cost(done) <= cost(solved(points, times, {"order": order}, **ends)) * (1 + 1e-9)
 

@@ -49,11 +49,10 @@ def test_where_there_is_room_limits_are_kept_strictly(limited):
         loose += [seed] if max(objective.kkt.values()) > 1e-7 or objective.gap > 1e-7 else []
         far += [seed] if objective.value > problem.known.squared_integral(problem.order) * (1 + 1e-12) else []
     assert far == []
-    assert set(over) <= {13, 38} and set(loose) <= {13, 38}
+    assert over == [] and set(loose) <= {38}
 
 
 @pytest.mark.parametrize("seed", [38, 302, 572])
-@pytest.mark.xfail(strict=True, reason="back ends stall with limits tightened by 1e-9: limits give by 3e-7 instead")
 def test_degenerate_ones_too(limited, seed):
     problem = limited(seed, -2.0)
     done = solved(problem.body, problem.options)
@@ -180,10 +179,7 @@ def test_straight_lines_cost_nothing():
     assert still.certificate.objective.value == 0
 
 
-LOST = pytest.mark.xfail(strict=True, reason="the dual value loses all digits: lower bound 0, kkt residuals of 1e-16")
-
-
-@pytest.mark.parametrize("ratio", [1e-2, 1e-3, pytest.param(1e-4, marks=LOST), pytest.param(1e-5, marks=LOST)])
+@pytest.mark.parametrize("ratio", [1e-2, 1e-3, 1e-4, 1e-5])
 def test_very_uneven_times_with_limits(ratio):
     """A gap that is 1e-5 of its neighbours, crossed at the speed of the curve around it."""
     times = np.array([0.0, 1.0, 1.0 + ratio, 2.0, 3.0])

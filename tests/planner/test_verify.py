@@ -140,3 +140,15 @@ def test_path_length_through_rests_and_kinks():
     rates = np.stack([-np.sin(circle), np.cos(circle)], axis=1)
     assert path_length(Trajectory.from_hermite(circle, points, rates)) == pytest.approx(2 * np.pi, rel=1e-7)
     assert path_length(Trajectory.hold([1.0], 0, 0)) == 0
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_closed_motion_must_close(order):
+    """Asked of a curve whose derivatives differ at the ends, that is found; of a periodic spline it holds."""
+    from planner.curves import cubic_spline
+
+    times, points = np.array([0.0, 1, 2, 3]), np.array([[0.0], [1], [-1], [0]])
+    closed = verify(cubic_spline(times, points, "periodic"), Demands(1, closed=order))
+    assert closed.holds and closed.boundary_error <= 1e-12
+    natural = cubic_spline(times, points, "clamped", 1.0, 0.0) if order == 1 else cubic_spline(times, points)
+    assert not verify(natural, Demands(1, closed=order)).holds
