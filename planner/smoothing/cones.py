@@ -1,7 +1,6 @@
 """The Euclidean norm of the velocity, kept through second-order cones at the places where it breaks its bound."""
 
 import time
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +45,7 @@ def kept_within_norm(cuts: Cuts, posed: Posed, norm: Array, tighter: float, ceil
         if worst <= 0.0 and not len(fast):
             program = _with_cones(cuts, cuts.program(rows, own=True), gap, u, norm)
             sharp, z = _sharpened(cuts, program, y, z, gap, u, norm)
-            return Kept(y, z, partial(_same, sharp), backend.name, used, seconds)
+            return Kept(y, z, sharp, backend.name, used, seconds)
         if not len(y):
             raise NoPoint(found, np.ones(len(found.u)), True, (fast, where, np.ones(len(fast))))
         rows = found if turn == 0 else rows.and_(found)
@@ -61,10 +60,6 @@ def kept_within_norm(cuts: Cuts, posed: Posed, norm: Array, tighter: float, ceil
         y, z = answer.y, answer.z
         seconds, used = seconds + time.perf_counter() - began, used + max(answer.iterations, 1)
     raise SolverFailed(backend.name, f"limits still broken after {ROUNDS} rounds")
-
-
-def _same(program: BandedQP) -> BandedQP:
-    return program
 
 
 def _sharpened(

@@ -26,7 +26,7 @@ class Found:
 
         Joints that are bound, or have the same unit and no rows, stay together.
         """
-        program, y, z = self.kept.program(), self.kept.y, self.kept.z
+        program, y, z = self.kept.program, self.kept.y, self.kept.z
         statement, weights = self.posed.statement, self.posed.weights
         if statement.bound or (not len(z) and (weights == weights[0]).all()):
             return [(program, y, z, float(weights[0]))]
@@ -48,7 +48,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Evidence for the lower bound and the KKT residuals; its matrices are built when they are asked for."""
+    """Evidence for the lower bound and the KKT residuals; what is dear of them is computed when it is asked for."""
 
     found: tuple[Found, ...]
 

@@ -143,7 +143,9 @@ def at_times(
 
 def _free(posed: Posed) -> Found:
     """Return the optimum without limits, from which the unknowns count."""
-    return Found(posed, Kept(np.zeros(posed.statement.size), np.zeros(0), posed.statement.program, ELIMINATION, 1, 0.0))
+    return Found(
+        posed, Kept(np.zeros(posed.statement.size), np.zeros(0), posed.statement.program(), ELIMINATION, 1, 0.0)
+    )
 
 
 def _broken(posed: Posed) -> list[int]:

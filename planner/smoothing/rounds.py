@@ -5,9 +5,8 @@ that there is none. Limits are tightened a little, so that what comes out keeps 
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,6 +30,8 @@ TIGHTER = 1e-10
 #: And where a waypoint or a given state already touches a limit: how far rounding may go.
 ROUNDING = 1e-9
 ROUNDS = 60
+#: Largest residuals, by the statement's own matrices, of what counts as an optimum.
+RESIDUALS = 1e-4
 #: Iterations of the interior point at most.
 MOST = 100
 #: With what slacks times multipliers it begins, in units of the cost; the next where it stalls.
@@ -80,7 +81,7 @@ class Kept:
 
     y: Array
     z: Array
-    program: Callable[[], BandedQP]
+    program: BandedQP
     name: str
     iterations: int
     seconds: float
@@ -233,7 +234,10 @@ def kept_within(cuts: Cuts, backend: Backend, ceiling: float, deadline: Deadline
         found, worst = cuts.at(y, near, curved)
         if worst <= 0.0 and (fine or not optimal):
             last = found if rows is None else rows
-            return Kept(y, z, partial(cuts.program, last, own=True), backend.name, used, seconds)
+            program = cuts.program(last, own=True)
+            if optimal and max(program.residuals(y, z).values()) > RESIDUALS:
+                raise NoPoint(last, z, False)
+            return Kept(y, z, program, backend.name, used, seconds)
         # kept, by a motion near the last: now once more at the present places, without second-order terms
         fine = not own or (worst <= 0.0 and before <= SETTLED)
         both = found if rows is None else rows.straight().and_(found)
