@@ -81,7 +81,7 @@ def smoothest(request: PlanRequest, how: Smoothing) -> Solution:
                 raise explained(conflict.posed, conflict.at, conflict.proof, search) from None
             continue
         if parts > 1 and how.parts is None:
-            message = f"one polynomial per gap cannot keep the limits: every gap has {parts} of them"
+            message = f"one polynomial per gap was not enough for the limits: every gap has {parts} of them"
             solution = replace(solution, notes=(*solution.notes, Note("sub_segments_used", message)))
         return solution
     raise AssertionError("nothing was tried")

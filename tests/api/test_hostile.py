@@ -136,8 +136,8 @@ def test_unknown_method(service, problem):
         ({"method": "linear", "limits": {"jerk": 1}}, "jerk"),
         ({"method": "ruckig", "limits": {"velocity": 1, "acceleration": 1}}, "times"),
         ({"limits": {"torque": 1}}, "torque"),
-        ({"tube": 0.1}, "tube"),
-        ({"waypoint_states": [None, {"velocity": [0, None]}, None]}, "waypoint_states"),
+        ({"method": "cubic_spline", "tube": 0.1}, "tube"),
+        ({"method": "linear", "waypoint_states": [None, {"velocity": [0, None]}, None]}, "waypoint_states"),
         ({"robot": {"model": "ur5e"}}, "robot"),
     ],
 )
