@@ -1,4 +1,5 @@
 import json
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -11,8 +12,12 @@ from api.errors import KINDS, LARGEST
 
 @pytest.fixture(scope="session")
 def service() -> Iterator[TestClient]:
-    """The service without a socket; what it does not catch is raised."""
+    """The service without a socket, once its kernels are compiled; what it does not catch is raised."""
     with TestClient(create_app()) as client:
+        for _ in range(3000):
+            if client.get("/readyz").status_code == 200:
+                break
+            time.sleep(0.1)
         yield client
 
 

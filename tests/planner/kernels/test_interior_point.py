@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 
-from planner.kernels.interior_point import INFEASIBLE, SOLVED, factor, interior_point, substitute, times
+from planner.kernels.interior_point import INFEASIBLE, SOLVED, STALLED, factor, interior_point, substitute, times
+from planner.smoothing.rounds import PUSHES
 from planner.solvers import BACKENDS
 from planner.solvers.qp import NoSolution, solve_qp
 from problems.banded_qp import BandedQP
@@ -52,7 +53,11 @@ def solve(a, gradient, columns, values, upper, bends=None, offsets=None, kappa=N
     none = np.zeros(len(upper))
     curves = (np.zeros_like(values) if bends is None else bends, none if offsets is None else offsets)
     table = (columns, values, upper, *curves, none if kappa is None else kappa)
-    status, iterations = interior_point(a, own, gradient, *table, ceiling, scale, scale, 1.0, 1e-11, 100, y, z)
+    for push in PUSHES:  # as the rounds do where it stalls
+        y[:] = 0.0
+        status, iterations = interior_point(a, own, gradient, *table, ceiling, scale, scale, push, 1e-11, 100, y, z)
+        if status != STALLED:
+            break
     return status, iterations, y, z
 
 
