@@ -15,7 +15,7 @@ ABOUT = f"""Curves of least squared jerk through given waypoints, one thread, pr
 - **Without limits**: random walks, uneven times, velocity and acceleration zero at the ends. Ours with all their checks
   and allocations, `out=` without the latter. spline-trajectory (C++, up to {unlimited.MOST_JOINTS} joints) gets its
   times as the list that it wants; general solvers get their matrices ready, one program a joint. *Difference*: of q, v,
-  a at 1000 times from those of our first entry. Drawn in `{growth.NAME}`, beside this report.
+  a at 1000 times from those of our first entry. Drawn in [{growth.NAME}]({growth.NAME}), beside this report.
 - **Within limits**: a joint's limits lie at a share f of the way from what is barely possible to the peaks without
   limits. Ours hold at all times and count everything but request and certificate (`plan` counts these too); the solvers
   are only set up and run, on ready matrices, with limits at {SAMPLES} samples a gap. *Cost*: over the best lower bound
