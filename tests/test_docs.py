@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
+import planner
 from api.app import create_app
 from planner import METHODS
 
@@ -56,7 +57,9 @@ def test_links_lead_somewhere(page):
         if not re.match(r"[a-z]+:", target):
             file, _, place = target.partition("#")
             to = page if not file else (page.parent / file).resolve()
-            assert to.exists(), target
+            root = Path(planner.__file__).resolve().parent.parent  # where the packages are, installed or not
+            elsewhere = root / re.sub(r"^(\.\./)+", "", file)
+            assert to.exists() or elsewhere.exists(), target
             if place:
                 assert re.search(f'^## {place}$|<a id="{place}">', to.read_text(encoding="utf-8"), re.M), target
 
