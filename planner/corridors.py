@@ -67,6 +67,21 @@ def norm_row(trajectory: Trajectory, demands: Demands, segment: NDArray[np.int64
     return Check("velocity_norm", None, at, time, float(value), bound, float(value / bound), holds)
 
 
+def highest_speeds(trajectory: Trajectory) -> Array:
+    """Return the largest Euclidean norm of the velocity on every piece, (K,), from the exact extrema of its square.
+
+    Raises
+    ------
+    OverflowError
+        The squares leave the range of floating point.
+    """
+    try:
+        squared, size = _squared_speed(trajectory)
+    except InvalidRequest as error:
+        raise OverflowError("the velocities are too large to be squared") from error
+    return np.asarray(size * np.sqrt(np.maximum(squared.extrema(1).high[0, :, 0], 0.0)))
+
+
 def _squared_speed(trajectory: Trajectory) -> tuple[Trajectory, float]:
     """Return the squared norm of the velocity over the square of a size, as a trajectory of one joint; and the size.
 

@@ -1,14 +1,16 @@
 """Eight numbers in a vector register, as a type of Numba with the few operations that the kernels need.
 
 LLVM's own vectorisers give up on these loops: they are short, and nothing tells that input and output do not overlap.
+The named operations round each on its own; the signs ``+ - * /`` may be fused, between lanes or lanes and a number.
 """
 
+import operator
 from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, models, register_model
+from numba.extending import intrinsic, models, overload, register_model
 
 LANES = 8
 
@@ -126,3 +128,52 @@ def exceeds(typing: Any, x: Any, y: Any) -> Any:
         return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(LANES), 0))
 
     return types.boolean(lanes, lanes), generate
+
+
+@intrinsic
+def filled(typing: Any, x: Any) -> Any:
+    """Return LANES times the number x."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return _everywhere(builder, args[0])
+
+    return lanes(types.float64), generate
+
+
+@intrinsic
+def root(typing: Any, x: Any) -> Any:
+    """Return the square root of x."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(_VECTOR, [_VECTOR])
+        module = builder.module
+        name = f"llvm.sqrt.v{LANES}f64"
+        called = module.globals.get(name) or ir.Function(module, kind, name)
+        return builder.call(called, [args[0]])
+
+    return lanes(lanes), generate
+
+
+def _sign(symbol: Any, instruction: str) -> None:
+    """Let a sign of Python stand for an instruction between lanes, or lanes and a number."""
+
+    @intrinsic
+    def operation(typing: Any, x: Any, y: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            pair = [_everywhere(builder, v) if v.type == ir.DoubleType() else v for v in args]
+            return getattr(builder, instruction)(*pair, flags=_FUSED)
+
+        return lanes(x, y), generate
+
+    @overload(symbol, strict=False)
+    def between(x: Any, y: Any) -> Any:
+        kinds = {type(x), type(y)}
+        if _Lanes in kinds and kinds <= {_Lanes, types.Float}:
+            return lambda x, y: operation(x, y)
+        return None
+
+
+_sign(operator.add, "fadd")
+_sign(operator.sub, "fsub")
+_sign(operator.mul, "fmul")
+_sign(operator.truediv, "fdiv")

@@ -14,6 +14,7 @@ from .quintic_spline import QUINTIC_SPLINE
 from .ruckig import RUCKIG
 from .septic_spline import SEPTIC_SPLINE
 from .time_optimal_nlp import TIME_OPTIMAL_NLP
+from .time_optimal_path import TIME_OPTIMAL_PATH
 from .time_scaled import TIME_SCALED
 from .toppra import TOPPRA
 from .trapezoidal import TRAPEZOIDAL
@@ -36,6 +37,7 @@ METHODS: dict[str, Method] = {
         RUCKIG,
         TIME_SCALED,
         TOPPRA,
+        TIME_OPTIMAL_PATH,
         TIME_OPTIMAL_NLP,
     )
 }

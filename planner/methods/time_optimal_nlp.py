@@ -8,11 +8,11 @@ from ..deadline import Deadline
 from ..errors import SolverFailed, Unsupported
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
-from ..timing.following import Timed, Units, follow
+from ..timing.course import Course
+from ..timing.following import Timed, Units, cut_at_corners, follow, time_each
 from ..timing.grids import initial_grid, refined
 from ..timing.nlp_law import nlp_law
 from ..timing.scaling import local_factors
-from ..trajectory import Trajectory
 from ..types import PlanRequest, Solution
 
 #: Refinement ends when slowing by this much is all that is left to do, or at so many stations.
@@ -37,7 +37,8 @@ def solve(request: PlanRequest, options: TimeOptimalNlpOptions) -> Solution:
     deadline = Deadline(request.timeout)
     path = build_path(options.path, request.waypoints)
 
-    def timed(stretch: Trajectory, units: Units) -> Timed:
+    def timed(course: Course) -> Timed:
+        stretch, units = course.curve, Units.of(course.curve, request.limits)
         first = 200 if request.limits.jerk is None else 100
         grid = initial_grid(stretch, options.stations or max(first, 12 * stretch.pieces))
         best = nlp_law(stretch, request.limits, units, grid, deadline.left())
@@ -51,7 +52,8 @@ def solve(request: PlanRequest, options: TimeOptimalNlpOptions) -> Solution:
         return best
 
     try:
-        return follow(path, request, timed, "ipopt")
+        each = cut_at_corners(path, request)
+        return follow(path, request, each, time_each(each, timed), "ipopt")
     except SolverFailed as error:
         reason = f"the nonlinear program has no usable answer on this path: {error}"
         raise Unsupported("time_optimal_nlp", "path", ["toppra", "trapezoidal"], reason) from None

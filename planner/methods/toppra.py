@@ -10,7 +10,7 @@ from ..errors import SolverFailed, Unsupported
 from ..limits import Limits
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
-from ..timing.following import Timed, Units, follow, in_a_row, split
+from ..timing.following import Timed, Units, cut_at_corners, follow, in_a_row, split, time_each
 from ..timing.grids import constant_acceleration_law, initial_grid, refined
 from ..timing.scaling import local_factors
 from ..timing.toppra_speeds import toppra_speeds
@@ -39,20 +39,21 @@ def solve(request: PlanRequest, options: ToppraOptions) -> Solution:
     deadline = Deadline(request.timeout)
     path = build_path(options.path, request.waypoints)
 
-    def timed(stretch: Trajectory, units: Units) -> Timed:
+    def timed(stretch: Trajectory) -> Timed:
         try:
-            return _refined(stretch, units, request.limits, options.stations, deadline)
+            return _refined(stretch, Units.of(stretch, request.limits), request.limits, options.stations, deadline)
         except SolverFailed as error:
             if stretch.pieces == 1:
                 reason = f"the toppra library fails on this path: {error.status}"
                 raise Unsupported("toppra", "path", ["time_optimal_nlp", "trapezoidal"], reason) from None
         shortest = int(np.argmin(np.diff(stretch.breaks)))  # where it is, speeds differ most from those elsewhere
         parts = split(stretch, stretch.breaks[1:-1][[k in (shortest - 1, shortest) for k in range(stretch.pieces - 1)]])
-        each = [timed(part, Units.of(part, request.limits)) for part in parts]
+        each = [timed(part) for part in parts]
         message = "toppra fails on the path as a whole: the motion stops at both ends of its shortest piece"
         return Timed(in_a_row([e.law for e in each]), sum(e.seconds for e in each), (Note("stops_added", message),))
 
-    return follow(path, request, timed, "toppra")
+    each = cut_at_corners(path, request)
+    return follow(path, request, each, time_each(each, lambda course: timed(course.curve)), "toppra")
 
 
 def _refined(stretch: Trajectory, units: Units, limits: Limits, stations: int | None, deadline: Deadline) -> Timed:

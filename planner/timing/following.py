@@ -12,7 +12,8 @@ from ..limits import Limits
 from ..paths import Path, refuse_position_limits
 from ..trajectory import Trajectory
 from ..types import MIN_STEP, Followed, Note, PlanRequest, Solution, Stats
-from .scaling import local_factors, slowdown, stretched
+from .course import Course, courses
+from .scaling import local_factors, norm_factor, slowdown, stretched
 
 Array = NDArray[np.float64]
 
@@ -59,58 +60,76 @@ class Timed:
 #: What a dwell takes of the whole motion: the path asks for one, nothing says how long.
 DWELL = 1e-6
 
-#: Times one smooth stretch of path.
-TimeStretch = Callable[[Trajectory, Units], Timed]
+#: Times one course, from its start to its end state.
+TimeCourse = Callable[[Course], Timed]
+
+State = tuple[float, float]
 
 
-def follow(path: Path, request: PlanRequest, time_stretch: TimeStretch, solver: str) -> Solution:
-    """Return the trajectory along the path, timed stretch by stretch, at rest at its ends and at its corners.
+def cut_at_corners(path: Path, request: PlanRequest, start: State = (0.0, 0.0), end: State = (0.0, 0.0)) -> list[Course]:
+    """Return the path's courses: cut where only a stop passes within finite acceleration (with a jerk limit: jerk).
 
-    A corner is where the path's tangent jumps (with a jerk limit: its curvature too); only a stop passes it within
-    finite acceleration (jerk).
+    ``start``, ``end``: path speed and acceleration at the ends of the whole.
 
     Raises
     ------
     Infeasible
-        The path leaves the position limits, or takes longer than the duration allows.
-    SolverFailed
-        The timing gives no usable law.
+        The path leaves the position limits.
     """
     refuse_position_limits(path, request)
-    corners = _corners(path.curve, 2 if request.limits.jerk is not None else 1)
-    stretches = split(path.curve, corners)
-    timed = [time_stretch(s, Units.of(s, request.limits)) if _moves(s) else None for s in stretches]
-    dwell = max(DWELL * sum(t.law.duration for t in timed if t), MIN_STEP)
+    limits = [request.limits, *(own for own in request.segment_limits or () if own is not None)]
+    corners = _corners(path.curve, 2 if any(x.jerk is not None for x in limits) else 1)
+    return courses(path, request, corners, start, end)
+
+
+def follow(
+    path: Path, request: PlanRequest, each: Sequence[Course], timed: Sequence[Timed | None], solver: str
+) -> Solution:
+    """Return the trajectory along the path by laws of its courses, one after the other (None: one that stands still).
+
+    From rest to rest it is slowed (or sped up) until the exact extrema touch the limits, and further as the duration
+    asks; a moving end would be changed by that.
+
+    Raises
+    ------
+    Infeasible
+        It takes longer than the duration allows.
+    SolverFailed
+        The laws do not fit together.
+    """
+    total = sum(t.law.duration for t in timed if t)
+    dwell = max(DWELL * total, MIN_STEP)
     laws = [
-        Trajectory.from_hermite([0.0, dwell], [[s.start], [s.end]]) if t is None else t.law
-        for s, t in zip(stretches, timed, strict=True)
+        Trajectory.from_hermite([0.0, dwell], [[c.curve.start], [c.curve.end]]) if t is None else t.law
+        for c, t in zip(each, timed, strict=True)
     ]
-    seconds = sum(t.seconds for t in timed if t)
     notes = dict.fromkeys(note for t in timed if t for note in t.notes)
     law = in_a_row(laws)
     times = _reached(law, path.knots)
     trajectory = path.curve.compose(law)
-    needed = slowdown(trajectory, request, times)
-    factor = max(needed.factor, 1e-300)
-    duration = stretched(factor * trajectory.duration, request.duration)
-    factor = duration / trajectory.duration
-    kind = "corner" if request.limits.jerk is None else "corner or jump of curvature"
-    if len(corners):
-        notes[Note("stops_at_corners", f"the path has {len(corners)} {kind}(s); the motion stops at each")] = None
+    if each[0].start == each[-1].end == (0.0, 0.0):
+        needed = max(slowdown(trajectory, request, times).factor, norm_factor(trajectory, request, times), 1e-300)
+        duration = stretched(needed * trajectory.duration, request.duration)
+        factor = duration / trajectory.duration
+        trajectory, law, times = trajectory.scaled(factor), law.scaled(factor), times * factor
+    else:
+        stretched(trajectory.duration, request.duration)
+    if len(each) > 1:
+        kind = "corner" if not any(c.jerk for c in each) else "corner or jump of curvature"
+        message = f"the path has {len(each) - 1} {kind}(s); the motion stops at each"
+        notes[Note("stops_at_corners", message)] = None
     return Solution(
-        trajectory.scaled(factor),
-        times * factor if path.passes else None,
-        Stats(solver, "solved", law.pieces, seconds),
-        Followed(path.curve, law.scaled(factor)),
+        trajectory,
+        times if path.passes else None,
+        Stats(solver, "solved", law.pieces, sum(t.seconds for t in timed if t)),
+        Followed(path.curve, law),
         notes=tuple(notes),
     )
 
 
-def _moves(stretch: Trajectory) -> bool:
-    if not stretch.rational:
-        return bool(stretch.coefficients[:-1].any())
-    found = stretch.extrema(1)
-    return bool((found.high - found.low > 1e-12 * np.abs(found.high)).any())
+def time_each(each: Sequence[Course], time_course: TimeCourse) -> list[Timed | None]:
+    """Return the laws of the courses; None for those that stand still."""
+    return [time_course(course) if course.moves else None for course in each]
 
 
 def _corners(curve: Trajectory, order: int) -> Array:

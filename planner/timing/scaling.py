@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..corridors import highest_speeds
 from ..errors import Infeasible
 from ..jumps import counted_jumps
-from ..limits import QUANTITIES, DurationBounds, Limits, magnitude, segment_bounds
+from ..limits import QUANTITIES, DurationBounds, Limits, magnitude, norm_bounds, segment_bounds
 from ..trajectory import Trajectory
 from ..types import PlanRequest
 from ..worst import measures, peaks, worst
@@ -63,6 +64,17 @@ def slowdown(trajectory: Trajectory, request: PlanRequest, waypoint_times: Array
         if factor > best.factor:
             best = Slowdown(factor, QUANTITIES[order])
     return Slowdown(best.factor * (1.0 + STRICT), best.binding)
+
+
+def norm_factor(trajectory: Trajectory, request: PlanRequest, waypoint_times: Array) -> float:
+    """Return the factor by which the limits of the velocity's Euclidean norm need the trajectory slowed; 0: none."""
+    bounds = norm_bounds(request.limits, request.segment_limits, request.count - 1)
+    if not np.isfinite(bounds).any():
+        return 0.0
+    trajectory = trajectory.split(waypoint_times)
+    middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
+    segment = np.clip(np.searchsorted(waypoint_times, middles, side="right") - 1, 0, request.count - 2)
+    return float((highest_speeds(trajectory) / bounds[segment]).max()) * (1.0 + STRICT)
 
 
 def local_factors(trajectory: Trajectory, limits: Limits) -> Array:
