@@ -73,6 +73,7 @@ class PlanRequest:
     wrap: NDArray[np.bool_] | None = None
     joint_names: tuple[str, ...] | None = None
     timeout: float | None = None
+    bound: bool = False
 
     @property
     def dims(self) -> int:
@@ -94,7 +95,8 @@ class PlanRequest:
         **given
             ``times`` (N,) s, ``limits``, ``segment_limits``, ``segment_durations``, ``duration``, ``start``, ``end``,
             ``waypoint_states``, ``waypoint_tolerance``, ``tube``, ``robot``, ``wrap`` (which joints turn without
-            end: each waypoint is then reached by the shortest turn), ``joint_names``, ``timeout`` s.
+            end: each waypoint is then reached by the shortest turn), ``joint_names``, ``timeout`` s, ``bound``
+            (whether a closer lower bound is worth more time than the plan).
 
         Raises
         ------
@@ -126,6 +128,7 @@ class PlanRequest:
             "wrap": lambda v: _flags(v, dims, "/wrap"),
             "joint_names": lambda v: _names(v, dims),
             "timeout": lambda v: positive(v, "/timeout"),
+            "bound": bool,
         }
         findings = reading.Findings()
         read: dict[str, Any] = {k: findings.take(readers[k], v) for k, v in given.items() if v is not None}

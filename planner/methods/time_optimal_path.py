@@ -1,14 +1,18 @@
 """Method ``time_optimal_path``."""
 
+from dataclasses import replace
+
 from pydantic import Field
 
 from ..deadline import Deadline
+from ..errors import SolverFailed, Unsupported
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
-from ..timing import second_order
 from ..timing.ends import path_state
-from ..timing.fastest import best_law
-from ..timing.following import cut_at_corners, follow
+from ..timing.fastest import Answer, fastest, lasting
+from ..timing.following import Timed, cut_at_corners, follow
+from ..timing.path_bounds import duration_bound
+from ..timing.scaling import stretched
 from ..types import PlanRequest, Solution
 
 
@@ -24,13 +28,32 @@ class TimeOptimalPathOptions(PathOptions):
 
 
 def solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
-    """Return the path run through as fast as the limits allow."""
+    """Return the path run through as fast as the limits allow, or as the duration asks."""
     deadline = Deadline(request.timeout)
     path = build_path(options.path, request.waypoints)
     start, end = (path_state(path.curve, getattr(request, side), side) for side in ("start", "end"))
     courses = cut_at_corners(path, request, start, end)
-    answers = [best_law(c, options.stations, 0.0, deadline) if c.moves else None for c in courses]
-    return follow(path, request, courses, [a and a.timed for a in answers], "passes")
+    answers = fastest(courses, options.stations, deadline)
+    solver = "interior_point" if any(c.jerk for c in courses) else "backward_and_forward_pass"
+    answer = follow(path, replace(request, duration=None), courses, _laws(answers), solver)
+    wanted = stretched(answer.trajectory.duration, request.duration)
+    moving = [a for a in answers if a is not None]
+    least = 0.0 if request.duration is None else request.duration.min
+    grids = [a.grid for a in moving]
+    bound = duration_bound([a.course for a in moving], grids, least, request.bound, deadline)
+    if wanted > answer.trajectory.duration:
+        try:
+            answers, solver = lasting(courses, options.stations, wanted, deadline), "interior_point"
+        except SolverFailed as error:
+            if any(not c.rests for c in courses):
+                reason = f"from or to a moving end the duration is not met: {error.status}"
+                raise Unsupported("time_optimal_path", "duration", reason=reason) from None
+        answer = follow(path, request, courses, _laws(answers), solver)
+    return replace(answer, bound=bound)
+
+
+def _laws(answers: list[Answer | None]) -> list[Timed | None]:
+    return [None if a is None else a.timed for a in answers]
 
 
 TIME_OPTIMAL_PATH = Method(
@@ -51,7 +74,9 @@ TIME_OPTIMAL_PATH = Method(
         "chosen",
         1,
         requires=frozenset({"acceleration"}),
-        honours=frozenset({"position", "velocity", "acceleration", "jerk", "velocity_norm", "segment_limits", "duration"}),
+        honours=frozenset(
+            {"position", "velocity", "acceleration", "jerk", "velocity_norm", "segment_limits", "duration"}
+        ),
         start=frozenset({"velocity", "acceleration"}),
         end=frozenset({"velocity", "acceleration"}),
         with_jerk=frozenset({"acceleration"}),

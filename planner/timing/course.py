@@ -115,7 +115,9 @@ class Use:
         return np.asarray(np.maximum(np.maximum(each[0], each[3]), np.maximum(np.sqrt(each[1]), np.cbrt(each[2]))))
 
 
-def courses(path: Path, request: PlanRequest, cuts: Array, start: tuple[float, float], end: tuple[float, float]) -> list[Course]:
+def courses(
+    path: Path, request: PlanRequest, cuts: Array, start: tuple[float, float], end: tuple[float, float]
+) -> list[Course]:
     """Return the path cut at some of its breaks, each part with the limits of its segments.
 
     The path's speed and acceleration at its ends are given; at the cuts it rests.
@@ -132,7 +134,9 @@ def courses(path: Path, request: PlanRequest, cuts: Array, start: tuple[float, f
     found = []
     for a, b in zip(ends[:-1], ends[1:], strict=True):
         course = Course(curve.part(a, b), lower[:, a:b], upper[:, a:b], norm[a:b])
-        found.append(replace(course, start=start if a == 0 else (0.0, 0.0), end=end if b == curve.pieces else (0.0, 0.0)))
+        found.append(
+            replace(course, start=start if a == 0 else (0.0, 0.0), end=end if b == curve.pieces else (0.0, 0.0))
+        )
     return found
 
 
@@ -147,7 +151,18 @@ def use(course: Course, grid: Array, law: LawPieces) -> Use:
     inverse = np.stack([1.0 / course.upper[:, piece], 1.0 / course.lower[:, piece]])
     most, mean = np.empty((4, count, dims)), np.empty(count)
     curve = course.curve
-    law_use(curve.breaks, curve.coefficients, piece, law.pieces, law.owner, _points(law), inverse, 1.0 / course.norm[piece], most, mean)
+    law_use(
+        curve.breaks,
+        curve.coefficients,
+        piece,
+        law.pieces,
+        law.owner,
+        _points(law),
+        inverse,
+        1.0 / course.norm[piece],
+        most,
+        mean,
+    )
     return Use(most, mean)
 
 
@@ -169,13 +184,13 @@ def _points(law: LawPieces) -> Array:
 
 def _use_of_rational(course: Course, grid: Array, law: LawPieces) -> Use:
     s, v, b, j, step = law.pieces
-    t = np.clip(_points(law), 1e-9, 1.0 - 1e-9)[:, None] * step  # inside, so that each piece's own derivatives are taken
+    t = (
+        np.clip(_points(law), 1e-9, 1.0 - 1e-9)[:, None] * step
+    )  # inside, so that each piece's own derivatives are taken
     at = np.clip(s + t * (v + t * (0.5 * b + t * j / 6.0)), course.curve.start, course.curve.end)
     speed, push = (v + t * (b + 0.5 * t * j))[:, :, None], (b + t * j)[:, :, None]
     q1, q2, q3 = course.curve.states(at, 3, first=1)
-    each = np.stack(
-        [q1 * speed, q2 * speed**2 + q1 * push, q3 * speed**3 + 3.0 * q2 * speed * push + q1 * j[:, None]]
-    )
+    each = np.stack([q1 * speed, q2 * speed**2 + q1 * push, q3 * speed**3 + 3.0 * q2 * speed * push + q1 * j[:, None]])
     piece = course.pieces(grid)[law.owner]
     ratios = np.maximum(each / course.upper[:, None, piece], each / course.lower[:, None, piece])
     norm = np.linalg.norm(each[0], axis=2)[:, :, None] / course.norm[piece][:, None] + np.zeros_like(q1)

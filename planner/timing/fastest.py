@@ -1,4 +1,4 @@
-"""The best law along a course: the fastest, or of a given duration the one of least squared path acceleration.
+"""The best laws along courses: the fastest, or of a given duration those of least squared path acceleration.
 
 Without jerk limits the fastest law has constant path acceleration by pieces (``second_order``); with them, and wherever
 path acceleration has a price, constant path jerk (``third_order``).
@@ -28,8 +28,17 @@ GOAL = 5e-4, 1e-3
 MOST = 40_000, 10_000
 #: Stations to begin with: in all, and to every piece of the path.
 FIRST = 64, 8
+#: The same share where limits are not meant to be used in full: the grid is split only where they are broken.
+UNUSED = 1e3
 #: Tolerances of the interior point while the grid changes, and at last.
 ROUGH, FINE = 1e-4, 1e-6
+
+
+#: A duration that is asked for is met from below by this much; the rest is a uniform slow-down.
+NEAR = 2e-4, 1.5e-3
+#: The same where the ends move, which no slow-down leaves alone.
+EXACT = -1e-8, 1e-8
+SEARCHES = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +50,68 @@ class Answer:
     grid: Array
 
 
-def best_law(course: Course, stations: int | None, price: float, deadline: Deadline) -> Answer:
+def fastest(courses: list[Course], stations: int | None, deadline: Deadline) -> list[Answer | None]:
+    """Return the fastest law along each course; None for one that stands still. Raises as ``best_law``."""
+    return [best_law(c, stations, 0.0, deadline) if c.moves else None for c in courses]
+
+
+def lasting(courses: list[Course], stations: int | None, duration: float, deadline: Deadline) -> list[Answer | None]:
+    """Return the laws of least squared path acceleration that take a duration together.
+
+    It is longer than the fastest laws', and met to ``NEAR`` (moving ends: ``EXACT``). All courses share one price g of
+    the squared path acceleration. Without limits a course of length L takes (36 g L²)^(1/4), from where the search for
+    the price begins.
+
+    Raises
+    ------
+    SolverFailed
+        The duration was not met.
+    """
+    low, high = NEAR if all(c.rests for c in courses) else EXACT
+    wanted = duration * (1.0 - 0.5 * (low + high))
+    lengths = np.array([c.curve.duration for c in courses if c.moves])
+    x, y = 4.0 * np.log(wanted / np.sqrt(lengths).sum()) - np.log(36.0), np.log(wanted)
+    slope, known = 0.25, []
+    grids: list[Array | None] = [None] * len(courses)
+    for _ in range(SEARCHES):
+        answers = [
+            best_law(c, stations, float(np.exp(x)), deadline, grid) if c.moves else None
+            for c, grid in zip(courses, grids, strict=True)
+        ]
+        taken = sum(a.timed.law.duration for a in answers if a)
+        if duration * (1.0 - high) <= taken <= duration * (1.0 - low):
+            return answers
+        grids = [a and a.grid for a in answers]  # from now on the same, so that the duration is smooth in the price
+        known.append((x, float(np.log(taken))))
+        if len(known) > 1 and min(k[1] for k in known) > y and known[-2][1] - known[-1][1] < 0.02 * (known[-1][1] - y):
+            break  # a lower price hardly makes it faster
+        x = _next(known, y, slope)
+    raise SolverFailed("timing", "no price of path acceleration gives the duration asked for")
+
+
+def _next(known: list[tuple[float, float]], wanted: float, slope: float) -> float:
+    """Return where an increasing function is ``wanted`` next: by secants inside the bracket, or a step beyond."""
+    x, y = known[-1]
+    below = max((k for k in known if k[1] < wanted), default=None)
+    above = min((k for k in known if k[1] > wanted), default=None)
+    if below is None or above is None:
+        step = (wanted - y) / slope
+        return x + float(np.sign(step) * np.clip(abs(step), 2.0, 8.0))
+    share = (wanted - below[1]) / (above[1] - below[1])
+    return below[0] + float(np.clip(share, 0.05, 0.95)) * (above[0] - below[0])
+
+
+def best_law(
+    course: Course, stations: int | None, price: float, deadline: Deadline, grid: Array | None = None
+) -> Answer:
     """Return the best law for a price of squared path acceleration against time; 0: the fastest.
 
     Parameters
     ----------
     stations : int
         A fixed number of them; None: as many as are needed.
+    grid : (n + 1,)
+        The stations themselves.
 
     Raises
     ------
@@ -58,8 +122,11 @@ def best_law(course: Course, stations: int | None, price: float, deadline: Deadl
     TimeLimit
     """
     third = course.jerk or price > 0.0
-    grid = initial_grid(course.curve, stations or max(FIRST[0], FIRST[1] * course.curve.pieces))
-    goal, most = np.inf if stations else GOAL[third], max(MOST[third], 2 * len(grid))
+    goal = np.inf if stations or grid is not None else UNUSED if price > 0.0 else GOAL[third]
+    if grid is None:
+        scale = 4 if price > 0.0 else 1
+        grid = initial_grid(course.curve, stations or scale * max(FIRST[0], FIRST[1] * course.curve.pieces))
+    most = max(MOST[third], 2 * len(grid))
     started = time.perf_counter()
     solve = partial(_third, course, price) if third else partial(_second, course)
     notes: tuple[Note, ...] = ()

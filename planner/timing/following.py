@@ -66,7 +66,9 @@ TimeCourse = Callable[[Course], Timed]
 State = tuple[float, float]
 
 
-def cut_at_corners(path: Path, request: PlanRequest, start: State = (0.0, 0.0), end: State = (0.0, 0.0)) -> list[Course]:
+def cut_at_corners(
+    path: Path, request: PlanRequest, start: State = (0.0, 0.0), end: State = (0.0, 0.0)
+) -> list[Course]:
     """Return the path's courses: cut where only a stop passes within finite acceleration (with a jerk limit: jerk).
 
     ``start``, ``end``: path speed and acceleration at the ends of the whole.

@@ -4,13 +4,10 @@ The path acceleration is constant on each interval, so the law is of class C1 an
 ``kernels.path_speeds`` for how a is found.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Infeasible, SolverFailed
-from ..types import Bound
 from .course import Course, LawPieces
 
 Array = NDArray[np.float64]
@@ -103,7 +100,8 @@ def _explain(course: Course, grid: Array, tight: Array, status: int, where: int,
     side = "start" if start else "end"
     raise Infeasible(
         f"the velocity asked at the {side} cannot be {'left' if start else 'reached'} within the limits: joint {joint} "
-        f"would need {high:.6g} times its acceleration" * enough
+        f"would need {high:.6g} times its acceleration"
+        * enough
         + f"the velocity asked at the {side} breaks a limit of velocity" * (not enough)
         + possible,
         joint=joint if enough else int(np.argmax(np.abs(slope))),
@@ -111,35 +109,3 @@ def _explain(course: Course, grid: Array, tight: Array, status: int, where: int,
         bound=float(limit[joint]) if enough else None,
         needed=float(high * limit[joint]) if enough else None,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class LeastDuration:
-    """Evidence that the courses take no less: an envelope above every profile within the limits, of any law.
-
-    A law of class C1 whose acceleration keeps its limits has a(s) = sdot² below the envelope; a jerk limit only adds to
-    that. ``grids``: stations of each course; a course without motion takes no time. For rational paths there is none.
-    """
-
-    courses: tuple[Course, ...]
-    grids: tuple[Array, ...]
-
-    def lower_bound(self) -> float:
-        """Return the sum of the courses' least durations, s."""
-        from ..kernels.path_speeds_bound import least_duration
-
-        total = 0.0
-        for course, grid in zip(self.courses, self.grids, strict=True):
-            piece, curve = course.pieces(grid), course.curve
-            limits = [getattr(course, side)[m][piece] for m in (1, 0) for side in ("lower", "upper")]
-            ends = course.start[0] ** 2, course.end[0] ** 2
-            seconds = np.empty(len(piece))
-            total += least_duration(curve.breaks, curve.coefficients, grid, *limits, course.norm[piece], *ends, seconds)
-        return float(total)
-
-
-def bound(courses: list[Course], grids: list[Array]) -> Bound | None:
-    """Return the bound of all laws along the path; None where the path is rational."""
-    if any(c.curve.rational for c in courses):
-        return None
-    return Bound("all", LeastDuration(tuple(courses), tuple(grids)))

@@ -305,7 +305,13 @@ def law_of(spline: Spline) -> LawPieces:
     x = 0.5 * tau
     pieces = np.empty((5, 2 * len(h)))
     pieces[:, 0::2] = s[:-1], v0, b0, early, x
-    pieces[:, 1::2] = s[:-1] + x * (v0 + x * (0.5 * b0 + x * early / 6.0)), v0 + x * (b0 + 0.5 * x * early), b0 + x * early, late, x
+    pieces[:, 1::2] = (
+        s[:-1] + x * (v0 + x * (0.5 * b0 + x * early / 6.0)),
+        v0 + x * (b0 + 0.5 * x * early),
+        b0 + x * early,
+        late,
+        x,
+    )
     owner = np.repeat(np.arange(len(h)), 2)
     if p.first.rest:
         pieces = np.concatenate([_end_pieces(grid[:2], spline.a[:2], p.first, True), pieces], axis=1)
@@ -341,5 +347,3 @@ def _ratios(p: Problem, y: Array) -> tuple[Array, Array]:
     abc = np.einsum("kri,ik->rk", p.maps, np.stack([y[:-2], y[1:-1], y[2:]]))
     forms = (p.forms.reshape(rows, 3, width)[:, :, :m] * abc).sum(axis=1)
     return abc, (forms[:, None] * p.inverse.reshape(rows, 2, width)[:, :, :m]).max(axis=1)
-
-
