@@ -275,14 +275,15 @@ def _resolved(request: PlanRequest, can: Capabilities, side: str) -> Boundary:
     """
     given: Boundary = getattr(request, side)
     names, states = getattr(can, side) | can.rests, _end_states(request, side)
+    moving = given.velocity is not None and bool(given.velocity.any())
     values = {}
     for name in names | states.keys():
         value = getattr(given, name)
         values[name] = np.zeros(request.dims) if value is None else value
         if value is None and name not in names:
             values[name] = np.full(request.dims, np.nan)
-        elif value is None and name in can.with_jerk:
-            values[name] = np.where(_jerk_limited(request), 0.0, np.nan)
+        elif value is None and name in can.with_jerk:  # zero along the path, which in a bend is not zero in the joints
+            values[name] = np.where(_jerk_limited(request) & (not moving), 0.0, np.nan)
         if name in states:
             values[name] = np.where(np.isnan(states[name]), values[name], states[name])
     return Boundary(**{n: v for n, v in values.items() if not np.isnan(v).all()})

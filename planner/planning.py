@@ -122,7 +122,7 @@ def pick(request: PlanRequest, method: str) -> tuple[Method, str | None]:
     """Return the method of that id; for ``auto`` the one that fits the times and limits, and why.
 
     ``auto``: times -> ``minimum_jerk``; velocity, acceleration and jerk limits -> ``ruckig``; an acceleration limit ->
-    ``toppra``; otherwise the request must say more.
+    ``time_optimal_path``; otherwise the request must say more.
     """
     if method != "auto":
         if method not in METHODS:
@@ -133,10 +133,9 @@ def pick(request: PlanRequest, method: str) -> tuple[Method, str | None]:
         return METHODS["minimum_jerk"], "times were given"
     if limits.jerk is not None and limits.velocity is not None and limits.acceleration is not None:
         return METHODS["ruckig"], "no times, but velocity, acceleration and jerk limits were given"
-    if limits.jerk is None and limits.acceleration is not None:
-        return METHODS["toppra"], "no times, but an acceleration limit was given"
-    missing = "/limits/acceleration" if limits.acceleration is None else "/limits/velocity"
-    raise InvalidRequest.of(missing, "missing", "give times, or limits on acceleration or on velocity to jerk")
+    if limits.acceleration is not None:
+        return METHODS["time_optimal_path"], "no times, but an acceleration limit was given"
+    raise InvalidRequest.of("/limits/acceleration", "missing", "give times, or at least limits on acceleration")
 
 
 def beyond_precision(trajectory: Trajectory, waypoints: Array) -> str | None:

@@ -16,8 +16,9 @@ iteration takes phi at its tangent, which lies below it, so that a step that kee
 Where the multipliers of an interval's jolts do not add up to more than h (their curvature is then no more than that of
 the objective) the point found is the optimum of the convex relaxation "rows <= j t, t >= phi(A), min sum h t" too.
 
-The passes over the rows are in ``path_jerk_rows``. Arrays over intervals have the interval last, in a number that is a multiple of LANES: the loops over them run in lanes.
-Intervals that only fill up have step, forms and inverse limits 0, A = 1 and an infinite cap.
+The passes over the rows are in ``path_jerk_rows``. Arrays over intervals have the interval last, in a number that is a
+multiple of LANES: the loops over them run in lanes. Intervals that only fill up have step, forms and inverse limits 0,
+A = 1 and an infinite cap.
 """
 
 import numpy as np

@@ -177,7 +177,8 @@ def _reach(steps, slopes, caps, lower, upper, first, last):  # type: ignore[no-u
         most = max(most, caps[k])
     if most < np.inf and most <= REACH * unit:
         return most
-    steepest, least = np.zeros(dims), np.full(dims, np.inf)
+    steepest, least = np.zeros(dims), np.zeros(dims)
+    least[:] = np.inf
     for k in range(count):
         length += steps[k]
         for d in range(dims):
@@ -222,8 +223,9 @@ def fastest_speeds(steps, slopes, bends, caps, lower, upper, first, last, best, 
     if last > caps[count] * (1.0 + MISS):
         return 1, count
     width = (dims + LANES - 1) // LANES * LANES
-    rows, spare = np.empty(6 * width), np.full(width, np.inf)
-    spare[:dims] = -np.inf
+    rows, spare = np.zeros(6 * width), np.zeros(width)
+    for d in range(width):
+        spare[d] = -np.inf if d < dims else np.inf
     arrays = slopes.reshape(-1), bends.reshape(-1), lower.reshape(-1), upper.reshape(-1)
     own = np.zeros(2 * width), np.zeros(2 * width), np.zeros(width), np.zeros(width)
     safe = count - (width + dims - 1) // dims  # after it eights would be read past the arrays
@@ -244,13 +246,13 @@ def fastest_speeds(steps, slopes, bends, caps, lower, upper, first, last, best, 
         if active >= 0 and rows[active] > 0.0:  # the row that was active at the last station mostly is so here, too
             guess = (top - rows[4 * width + active]) / rows[active] * (1.0 - PULL)
             start = max(min(guess, limit), 0.0)
-        x, now = walk(start, True, rows, top, bottom)
+        x, now = walk(start, -1.0, rows, top, bottom)
         active = now if now >= 0 else active
-        x = x * (1.0 - PULL) if x < start else x
+        x = x * (1.0 - PULL) if x < limit else x
         if bottom <= 0.0:  # resting is always possible
             best[k], least[k] = max(x, 0.0), 0.0
             continue
-        low = min(walk(0.0, False, rows, top, bottom)[0] * (1.0 + PULL), limit)
+        low = min(walk(0.0, 1.0, rows, top, bottom)[0] * (1.0 + PULL), limit)
         if x < 0.0 or low < 0.0 or low > x * (1.0 + MISS):
             return 1, k
         best[k], least[k] = x, min(low, x)

@@ -100,7 +100,7 @@ def _turn(control, own):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _carried(z, step, control, lower, upper, backwards, own):  # type: ignore[no-untyped-def]
+def _carried(z, step, control, lower, upper, way, own):  # type: ignore[no-untyped-def]
     """Return the largest sdot² at an interval's other end of the laws that start it with sdot² <= z.
 
     Every joint bounds it by itself: where q_j is monotone, its squared speed grows by at most twice the limit times the
@@ -108,31 +108,31 @@ def _carried(z, step, control, lower, upper, backwards, own):  # type: ignore[no
     ``upper`` (D,) the acceleration limits.
     """
     dims, size = control.shape
-    best = np.inf
+    best, backwards = np.inf, way < 0.0
     for d in range(dims):
         start, end = (control[d, size - 1], control[d, 0]) if backwards else (control[d, 0], control[d, size - 1])
         changes = _changes(control[d])[0]
         if changes > 1 or end == 0.0:
             continue
-        way = 0.0
+        length = 0.0
         if changes == 1:
             before, after = _turn(control[d], own)
-            way, square = abs(before if backwards else after), 0.0
+            length, square = abs(before if backwards else after), 0.0
         else:
             for i in range(size):
-                way += control[d, i]
-            way, square = abs(way) / size, z * start * start if start != 0.0 else 0.0
+                length += control[d, i]
+            length, square = abs(length) / size, z * start * start if start != 0.0 else 0.0
         limit = upper[d] if (end > 0.0) != backwards else -lower[d]
-        best = min(best, (square + 2.0 * limit * way * step) / (end * end))
+        best = min(best, (square + 2.0 * limit * length * step) / (end * end))
     return best
 
 
 @njit(cache=True, error_model="numpy")
-def _line(z, step, control, lower, upper, backwards):  # type: ignore[no-untyped-def]
+def _line(z, step, control, lower, upper, way):  # type: ignore[no-untyped-def]
     """Return the ends of a line over an interval that stays above every law with sdot² <= z where it starts."""
     dims, size = control.shape
     m = size - 1
-    best_start = best_end = np.inf
+    best_start, best_end, backwards = np.inf, np.inf, way < 0.0
     for d in range(dims):
         changes, sign = _changes(control[d])
         if sign == 0:
@@ -256,18 +256,22 @@ def _time(step, lines, at):  # type: ignore[no-untyped-def]
 
     Lines that are not finite do not count. ``at`` (5,) is scratch.
     """
-    count = 2
-    at[0], at[1] = 0.0, 1.0
+    count = 1
+    at[0] = 0.0
     for i in range(3):
         for j in range(i):
             left, right = lines[i, 0] - lines[j, 0], lines[i, 1] - lines[j, 1]
             if left * right < 0.0 and abs(left) < np.inf and abs(right) < np.inf:
                 at[count] = left / (left - right)
                 count += 1
-    places = np.sort(at[:count])
+    at[count] = 1.0
+    count += 1
+    for i in range(2, count):
+        for j in range(i, 1, -1):
+            at[j - 1], at[j] = min(at[j - 1], at[j]), max(at[j - 1], at[j])
     total = 0.0
     for r in range(count - 1):
-        x0, x1 = places[r], places[r + 1]
+        x0, x1 = at[r], at[r + 1]
         left = right = np.inf
         for i in range(3):
             y0, y1 = lines[i, 0], lines[i, 1]
@@ -323,19 +327,19 @@ def least_duration(  # type: ignore[no-untyped-def]
                 total += q * q
             x = min(x, norm[k] * norm[k] / total) if total > 0.0 else x
             most[k + end] = min(most[k + end], _ceiling(x, slopes, bends, lower[k], upper[k]))
-        chords[k] = _chord(controls[k], v_lower[k], v_upper[k], norm[k], squares, own)
+        chords[k, 0], chords[k, 1] = _chord(controls[k], v_lower[k], v_upper[k], norm[k], squares, own)
     turn = np.empty((2, size))
     for k in range(count):
         step = grid[k + 1] - grid[k]
-        most[k + 1] = min(most[k + 1], _carried(most[k], step, controls[k], lower[k], upper[k], False, turn))
+        most[k + 1] = min(most[k + 1], _carried(most[k], step, controls[k], lower[k], upper[k], 1.0, turn))
     duration = 0.0
     for k in range(count - 1, -1, -1):
         step = grid[k + 1] - grid[k]
-        most[k] = min(most[k], _carried(most[k + 1], step, controls[k], lower[k], upper[k], True, turn))
-        line = _line(most[k + 1], step, controls[k], lower[k], upper[k], True)
+        most[k] = min(most[k], _carried(most[k + 1], step, controls[k], lower[k], upper[k], -1.0, turn))
+        line = _line(most[k + 1], step, controls[k], lower[k], upper[k], -1.0)
         lines[0, 0], lines[0, 1] = line[1], line[0]
-        lines[1] = _line(most[k], step, controls[k], lower[k], upper[k], False)
-        lines[2] = chords[k]
+        lines[1, 0], lines[1, 1] = _line(most[k], step, controls[k], lower[k], upper[k], 1.0)
+        lines[2, 0], lines[2, 1] = chords[k, 0], chords[k, 1]
         seconds[k] = (1.0 - SLACK) * _time(step, lines, at)
         duration += seconds[k]
     return duration

@@ -15,6 +15,9 @@ from ..types import PlanRequest
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+#: Path speed and path acceleration.
+State = tuple[float, float]
+
 #: Where an interval with one piece of law, or each of two pieces, is looked at, in shares of the piece's duration.
 POINTS = {1: np.array([0.0, 0.25, 0.5, 0.75, 1.0]), 2: np.array([0.0, 0.5, 1.0])}
 
@@ -32,8 +35,8 @@ class Course:
     lower: Array
     upper: Array
     norm: Array
-    start: tuple[float, float] = (0.0, 0.0)
-    end: tuple[float, float] = (0.0, 0.0)
+    start: State = (0.0, 0.0)
+    end: State = (0.0, 0.0)
 
     @property
     def jerk(self) -> bool:
@@ -44,8 +47,9 @@ class Course:
     def even(self) -> bool:
         """Whether acceleration and its limits are continuous along the course, so that one side of a station tells."""
         same = all((x == x[:, :1]).all() for x in (self.lower, self.upper))
-        peak = self.curve.extrema(3).peak(2) if self.curve.pieces > 1 else 0.0
-        return same and not counted_jumps(self.curve, 2, peak).any()
+        if self.curve.pieces == 1 or not same:
+            return same
+        return not counted_jumps(self.curve, 2, self.curve.extrema(3).peak(2)).any()
 
     @property
     def rests(self) -> bool:
@@ -144,25 +148,13 @@ def use(course: Course, grid: Array, law: LawPieces) -> Use:
     """Return how fully a law uses the limits, from some points of each of its pieces."""
     from ..kernels.path_use import law_use
 
-    piece = course.pieces(grid)
-    count, dims = len(piece), course.curve.dims
     if course.curve.rational:
         return _use_of_rational(course, grid, law)
+    piece, curve = course.pieces(grid), course.curve
     inverse = np.stack([1.0 / course.upper[:, piece], 1.0 / course.lower[:, piece]])
-    most, mean = np.empty((4, count, dims)), np.empty(count)
-    curve = course.curve
-    law_use(
-        curve.breaks,
-        curve.coefficients,
-        piece,
-        law.pieces,
-        law.owner,
-        _points(law),
-        inverse,
-        1.0 / course.norm[piece],
-        most,
-        mean,
-    )
+    norm, most, mean = 1.0 / course.norm[piece], np.empty((4, len(piece), curve.dims)), np.empty(len(piece))
+    points = _points(law)
+    law_use(curve.breaks, curve.coefficients, piece, law.pieces, law.owner, points, inverse, norm, most, mean)
     return Use(most, mean)
 
 

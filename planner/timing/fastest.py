@@ -81,7 +81,8 @@ def lasting(courses: list[Course], stations: int | None, duration: float, deadli
         taken = sum(a.timed.law.duration for a in answers if a)
         if duration * (1.0 - high) <= taken <= duration * (1.0 - low):
             return answers
-        grids = [a and a.grid for a in answers]  # from now on the same, so that the duration is smooth in the price
+        # from now on the same grids, so that the duration is smooth in the price
+        grids = [None if a is None else a.grid for a in answers]
         known.append((x, float(np.log(taken))))
         if len(known) > 1 and min(k[1] for k in known) > y and known[-2][1] - known[-1][1] < 0.02 * (known[-1][1] - y):
             break  # a lower price hardly makes it faster
@@ -148,7 +149,7 @@ def _second(course: Course, grid: Array, tight: Array, before: Attempt | None, r
 def _third(course: Course, price: float, grid: Array, tight: Array, before: Attempt | None, rough: bool) -> Attempt:
     ceiling = second_order.fastest_profile(course.without_jerk(), grid, np.ones_like(tight))
     if before is None or before.spline is None:
-        guess = np.maximum(ceiling, 1e-2 * ceiling[ceiling > 0].min())
+        guess = third_order.first_guess(ceiling)
     else:
         guess = before.spline.guess(grid)
     problem = third_order.pose(course, grid, tight, ceiling)

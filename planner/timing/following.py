@@ -12,7 +12,7 @@ from ..limits import Limits
 from ..paths import Path, refuse_position_limits
 from ..trajectory import Trajectory
 from ..types import MIN_STEP, Followed, Note, PlanRequest, Solution, Stats
-from .course import Course, courses
+from .course import Course, State, courses
 from .scaling import local_factors, norm_factor, slowdown, stretched
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ DWELL = 1e-6
 #: Times one course, from its start to its end state.
 TimeCourse = Callable[[Course], Timed]
 
-State = tuple[float, float]
+REST: State = (0.0, 0.0)
 
 
 def cut_at_corners(
@@ -109,7 +109,7 @@ def follow(
     law = in_a_row(laws)
     times = _reached(law, path.knots)
     trajectory = path.curve.compose(law)
-    if each[0].start == each[-1].end == (0.0, 0.0):
+    if each[0].start == each[-1].end == REST:
         needed = max(slowdown(trajectory, request, times).factor, norm_factor(trajectory, request, times), 1e-300)
         duration = stretched(needed * trajectory.duration, request.duration)
         factor = duration / trajectory.duration
@@ -161,7 +161,8 @@ def _reached(law: Trajectory, knots: Array) -> Array:
     """Return when a law reaches the knots, which lie at its breaks' values."""
     left, right = (x[:, 0] for x in law.ends(0))
     values = np.append(left, right[-1])
-    index = np.abs(values[None, :] - knots[:, None]).argmin(axis=1)
+    after = np.clip(np.searchsorted(values, knots), 1, len(values) - 1)
+    index = np.where(knots - values[after - 1] <= values[after] - knots, after - 1, after)
     if np.abs(values[index] - knots).max() > 1e-9 * max(float(np.ptp(knots)), 1e-300):
         raise SolverFailed("timing", "a waypoint is not on the grid")
     return np.asarray(law.breaks[index])

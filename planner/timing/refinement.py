@@ -2,7 +2,8 @@
 
 A law is piecewise: within an interval only one place of one row can be at its limit. What is lost by that on interval k
 is about tau_k (1 - mean use), of second order in its step, so that splitting it into p parts leaves 1/p of it. The
-splitting that brings the sum to a goal with the fewest stations is p_k = sqrt(loss_k / e), e = (goal / sum sqrt(loss))².
+splitting that brings the sum to a goal with the fewest stations is p_k = sqrt(loss_k / e) with
+e = (goal / sum sqrt(loss))².
 Where a limit is broken between the rows that hold it, the row's limit is lowered there to what makes it hold.
 """
 
@@ -27,6 +28,8 @@ GRADING = 3.0
 PARTS = 4
 #: While the grid is not final, limits are lowered to no less than this share.
 MILD = 0.9
+#: Limits are never lowered to less than this share.
+LEAST = 0.1
 #: Slowing by less than this is left to the uniform slow-down at the end.
 SLOW = 1e-4
 #: With moving ends nothing is slowed at the end: limits must be kept to this.
@@ -35,6 +38,8 @@ EXACT = 1e-8
 WORTH = 0.1
 SPLITTINGS = 7
 ROUNDS = 24
+#: The last rounds, on a grid that stays.
+SETTLING = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +102,14 @@ def refined(course: Course, grid: Array, solve: Solve, goal: float, most: int, d
         score = law.duration * max(1.0 + over, 1.0)
         if score < best:
             best, best_found = score, Refined(attempt, grid, float(loss.sum()))
-        parts = _parts(grid, loss, factors, goal * law.duration, most) if splittings < SPLITTINGS else None
-        splits = parts is not None and parts.sum() > (1.0 + WORTH) * len(parts)
+        refines = splittings < SPLITTINGS and goal < np.inf
+        coarse = goal < np.inf and over > COARSE and turn < ROUNDS - SETTLING
+        parts = _parts(grid, loss if refines else np.zeros_like(loss), factors, goal * law.duration, most)
+        splits = refines and parts.sum() > (1.0 + WORTH) * len(parts) or coarse and parts.sum() > len(parts)
         if over <= (SLOW if course.rests else EXACT) and not splits:
             return Refined(attempt, grid, float(loss.sum()))
         lowered = _lowered(tight, found, attempt.share, 1.0 - 0.3 * (SLOW if course.rests else EXACT))
-        if splits and turn < ROUNDS - 1:
-            assert parts is not None
+        if splits:
             splittings += 1
             owner, grid = _split(grid, parts)
             tight = 1.0 - (1.0 - np.maximum(lowered, MILD)[:, owner]) / parts[owner][:, None]
@@ -119,13 +125,13 @@ def _lowered(tight: Array, found: Use, share: Array | None, target: float) -> Ar
     most = found.most
     used = tight if share is None else np.minimum(share, tight)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(most > 1.0, np.maximum(used * (target / most), 1e-6), tight)
+        return np.where(most > 1.0, np.maximum(used * (target / most), LEAST), tight)
 
 
 def _parts(grid: Array, loss: Array, factors: Array, goal: float, most: int) -> NDArray[np.int64]:
     """Return into how many parts each interval is to be split."""
     roots = np.sqrt(np.where(np.isfinite(loss), loss, loss[np.isfinite(loss)].max(initial=1.0)))
-    each = (goal / max(roots.sum(), 1e-300)) ** 2 if goal < np.inf else np.inf
+    each = (goal / max(roots.sum(), 1e-100)) ** 2 if goal < np.inf else np.inf
     with np.errstate(divide="ignore", invalid="ignore"):
         wanted = np.ceil(roots / np.sqrt(each) - 0.2)
         if goal < np.inf:

@@ -47,7 +47,7 @@ class End:
 
     @classmethod
     def of(cls, state: tuple[float, float], step: float, jerk: bool) -> "End":
-        """Return the end of a given path speed and acceleration, for motion away from it; the first step is ``step``."""
+        """Return the end of given path speed and acceleration, for motion away from it; the first step is ``step``."""
         speed, push = state
         if speed > 0.0:
             return cls(False, 0.0, 0.0, (speed * speed, push))
@@ -119,9 +119,9 @@ def pose(course: Course, grid: Array, tight: Array, ceiling: Array) -> Problem:
     maps = np.empty((count, 3, 3))
     spline_maps(nodes, ratios, maps)
     fixed = np.zeros(count + 2, dtype=bool)
-    for end, at in ((first, (0, 1)), (last, (-1, -2))):
-        fixed[at[0]] = True
-        fixed[at[1]] |= end.fixed is not None
+    fixed[[0, -1]] = True
+    fixed[1] |= first.fixed is not None
+    fixed[-2] |= last.fixed is not None
     piece = course.pieces(grid)[inner]
     lower, upper = course.lower[:, piece] * tight[:3, inner], course.upper[:, piece] * tight[:3, inner]
     h = np.diff(nodes)[:, None]
@@ -282,6 +282,11 @@ def _read(p: Problem, y: Array, multipliers: tuple[Array, Array], iterations: in
     if p.last.rest:
         a, b = np.append(a, 0.0), np.append(b, 0.0)
     return Spline(p.grid, a, b, p, y, multipliers, iterations)
+
+
+def first_guess(ceiling: Array) -> Array:
+    """Return values a to begin with: those of the fastest profile without jerk limits, but nowhere near 0."""
+    return np.asarray(np.maximum(ceiling, 1e-2 * ceiling[ceiling > 0].min()))
 
 
 def law_of(spline: Spline) -> LawPieces:
