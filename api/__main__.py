@@ -1,4 +1,4 @@
-"""The command line: ``waywright plan | compare | certify | methods | serve``. No FastAPI except to serve."""
+"""The command line: ``waywright plan | compare | certify | retime | methods | serve``. No FastAPI except to serve."""
 
 import argparse
 import json
@@ -25,10 +25,10 @@ from . import encode
 from .errors import problem
 from .judging import certificate
 from .reading import decode, parse
-from .schemas import CertifyBody, CompareBody, PlanBody
+from .schemas import CertifyBody, CompareBody, PlanBody, RetimeBody
 from .settings import LOCAL, Caps
 from .tables import aligned, certificate_table, table
-from .work import answer_plan, comparison
+from .work import Answer, answer_plan, answer_retiming, comparison
 
 DONE, FAILED, BAD_INPUT, INFEASIBLE = 0, 1, 2, 3
 
@@ -107,6 +107,13 @@ def _parser() -> argparse.ArgumentParser:
     certify.add_argument("file", metavar="FILE", help="a certificate request as JSON; - for standard input")
     certify.set_defaults(run=_certify)
 
+    retime = commands.add_parser(
+        "retime", help="time a path anew", description="Run through a trajectory's path as fast as the limits allow."
+    )
+    retime.add_argument("file", metavar="FILE", help="a retiming request as JSON; - for standard input")
+    retime.add_argument("--out", metavar="FILE", help="write the answer to a .json or .csv file")
+    retime.set_defaults(run=_retime)
+
     methods = commands.add_parser("methods", help="list the methods", description="List the methods, or describe one.")
     methods.add_argument("id", metavar="ID", nargs="?", help="a method's id")
     methods.set_defaults(run=_methods)
@@ -133,20 +140,34 @@ def _read(file: str) -> Any:
 
 
 def _plan(arguments: argparse.Namespace) -> int:
-    media_type = encode.JSON if arguments.out is None else OUT.get(Path(arguments.out).suffix.lower())
-    if media_type is None:
-        raise Usage(f"{arguments.out}: cannot write this format; available: {', '.join(OUT)}")
-    value = _read(arguments.file)
+    media_type, value = _media_type(arguments.out), _read(arguments.file)
     if isinstance(value, dict):
         if arguments.method is not None:
             value["method"] = arguments.method
         options = {} if value.get("options") is None else value["options"]
         if arguments.option and isinstance(options, dict):  # what is no object is refused with the rest
             value["options"] = {**options, **dict(_option(text) for text in arguments.option)}
-    answer = answer_plan(parse(PlanBody, value), LOCAL, media_type)
-    if arguments.out is not None:
-        _write(Path(arguments.out), answer.content)
-        print(f"wrote {arguments.out}")
+    return _deliver(answer_plan(parse(PlanBody, value), LOCAL, media_type), arguments.out)
+
+
+def _retime(arguments: argparse.Namespace) -> int:
+    media_type, body = _media_type(arguments.out), parse(RetimeBody, _read(arguments.file))
+    return _deliver(answer_retiming(body, LOCAL, media_type), arguments.out)
+
+
+def _media_type(out: str | None) -> str:
+    """Return the format of the file to be written; JSON where there is none."""
+    media_type = encode.JSON if out is None else OUT.get(Path(out).suffix.lower())
+    if media_type is None:
+        raise Usage(f"{out}: cannot write this format; available: {', '.join(OUT)}")
+    return media_type
+
+
+def _deliver(answer: Answer, out: str | None) -> int:
+    """Write an answer to a file, or print its certificate."""
+    if out is not None:
+        _write(Path(out), answer.content)
+        print(f"wrote {out}")
         return DONE
     tree = decode(answer.content)
     print(f"method: {tree['method']}" + (f" ({tree['picked_because']})" if "picked_because" in tree else ""))

@@ -67,7 +67,8 @@ class CertificateReply(Reply):
     boundary_error: float | None = Field(description="Largest miss of a state asked at an end or waypoint, relative")
     continuity: int | None = Field(description="Class C^k; null for one piece")
     path_deviation: float | None = Field(
-        description="Largest distance from the path followed, or, with a tube, from the polyline"
+        description="Largest distance from the path followed, or, with a tube, from the polyline; of a retiming with a "
+        "tolerance: of a sample from the path, in any joint"
     )
     cost: dict[str, float | None] = Field(description="squared_jerk and path_length")
     objective: ObjectiveReply | None = Field(description="null for methods that minimise nothing")

@@ -15,7 +15,7 @@ from planner import PlannerError, __version__
 from .errors import Refusal
 from .middleware import Envelope
 from .openapi import components
-from .routes import certificates, comparisons, discovery, methods, trajectories
+from .routes import certificates, comparisons, discovery, methods, retimings, trajectories
 from .settings import Caps
 from .warmup import Warmup
 from .web import problem_response
@@ -57,7 +57,7 @@ def create_app(settings: Caps | None = None) -> Service:
     app.add_exception_handler(PlannerError, _refused)
     app.add_exception_handler(Refusal, _refused)
     app.add_exception_handler(HTTPException, _http_error)
-    for module in (trajectories, comparisons, certificates, methods, discovery):
+    for module in (trajectories, comparisons, certificates, retimings, methods, discovery):
         app.include_router(module.router)
     return app
 

@@ -32,6 +32,15 @@ class Given(TypedDict, total=False):
     timeout: float | None
 
 
+class Timing(TypedDict, total=False):
+    """What a retiming may ask for besides a trajectory and its limits; see the HTTP contract, section 6."""
+
+    duration: Any
+    joint_names: Any
+    sampling: Any
+    timeout: float | None
+
+
 def _headers(api_key: str | None) -> dict[str, str]:
     headers = {"Accept": "application/json, application/problem+json", "User-Agent": "waywright"}
     return headers if api_key is None else {**headers, "X-API-Key": api_key}
@@ -111,6 +120,29 @@ class Client:
         certificate: dict[str, Any] = self._call(wire.certify_call(trajectory, given))["certificate"]
         return certificate
 
+    def retime(
+        self,
+        trajectory: Any,
+        *,
+        limits: Any,
+        tolerance: float | None = None,
+        include: Sequence[str] = ("samples",),
+        **given: Unpack[Timing],
+    ) -> Result:
+        """Return the same path, run through as fast as the limits allow.
+
+        Parameters
+        ----------
+        trajectory
+            A ``Trajectory``, ``Samples``, ``Result`` or the contract's object, a ROS 2 JointTrajectory among them.
+        tolerance : float
+            How far the path may be from samples, in every joint, to be smoother.
+        **given
+            ``duration``, ``joint_names``, ``sampling`` and ``timeout`` s, as for a plan.
+        """
+        asked = {**given, "limits": limits, "tolerance": tolerance}
+        return Result.of(self._call(wire.retime_call(trajectory, asked, include)))
+
     def methods(self, id: str | None = None) -> Any:
         """Return the catalogue, or the row of one method."""
         return self._call(wire.methods_call(id))
@@ -188,6 +220,19 @@ class AsyncClient:
         given = {"limits": limits, "waypoints": waypoints, "times": times, "start": start, "end": end}
         certificate: dict[str, Any] = (await self._call(wire.certify_call(trajectory, given)))["certificate"]
         return certificate
+
+    async def retime(
+        self,
+        trajectory: Any,
+        *,
+        limits: Any,
+        tolerance: float | None = None,
+        include: Sequence[str] = ("samples",),
+        **given: Unpack[Timing],
+    ) -> Result:
+        """Return the same path, run through as fast as the limits allow; see ``Client.retime``."""
+        asked = {**given, "limits": limits, "tolerance": tolerance}
+        return Result.of(await self._call(wire.retime_call(trajectory, asked, include)))
 
     async def methods(self, id: str | None = None) -> Any:
         """Return the catalogue, or the row of one method."""

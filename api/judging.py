@@ -44,12 +44,18 @@ def _trajectory(body: CertifyBody, caps: Caps) -> Trajectory | Recorded:
     if (polynomial is None) == (samples is None):
         raise InvalidRequest.of("/trajectory", "conflict", "needs exactly one of polynomial and samples")
     if samples is not None:
-        return _recorded(samples, caps)
+        return recorded(samples, caps)
     assert polynomial is not None
-    return _polynomial(polynomial, caps)
+    return polynomial_of(polynomial, caps)
 
 
-def _recorded(samples: SamplesBody, caps: Caps) -> Recorded:
+def recorded(samples: SamplesBody, caps: Caps) -> Recorded:
+    """Return samples, checked.
+
+    Raises
+    ------
+    InvalidRequest, TooLarge
+    """
     dims = len(samples.position[0]) if samples.position else 0
     if not dims:
         raise InvalidRequest.of(f"{_SAMPLES}/position", "too_few_points", "needs at least one joint")
@@ -58,7 +64,13 @@ def _recorded(samples: SamplesBody, caps: Caps) -> Recorded:
     return Recorded.of(samples.time, samples.position, samples.velocity, samples.acceleration)
 
 
-def _polynomial(polynomial: PolynomialBody, caps: Caps) -> Trajectory:
+def polynomial_of(polynomial: PolynomialBody, caps: Caps) -> Trajectory:
+    """Return a piecewise polynomial, checked.
+
+    Raises
+    ------
+    InvalidRequest, TooLarge
+    """
     where = f"{_POLYNOMIAL}/coefficients"
     refuse_above(len(polynomial.coefficients) - 1, MAX_DEGREE, "polynomial degree")
     pieces = len(polynomial.breaks) - 1

@@ -12,7 +12,7 @@ from . import answers as a
 from .encode import CSV, FORMATS, JSON, ROS2
 from .errors import KINDS, MEDIA_TYPE
 from .ruckig_shape import RuckigBody
-from .schemas import CertifyBody, CompareBody, PlanBody
+from .schemas import CertifyBody, CompareBody, PlanBody, RetimeBody
 
 _POST_ERRORS = (
     "invalid_request",
@@ -78,6 +78,17 @@ OPERATIONS: dict[str, Operation] = {
         body=(CertifyBody,),
         errors=_POST_ERRORS,
         example={"trajectory": {"polynomial": _POLYNOMIAL}, "limits": {"velocity": 2}},
+    ),
+    "retime": Operation(
+        "planning",
+        a.PlanReply,
+        body=(RetimeBody,),
+        formats=FORMATS,
+        errors=_POST_ERRORS,
+        example={
+            "trajectory": {"samples": {"time": [0, 1, 2], "position": [[0, 0], [1, 2], [2, 3]]}},
+            "limits": {"velocity": 2, "acceleration": 5},
+        },
     ),
     "methods": Operation("discovery", a.MethodReply, many=True),
     "method": Operation(

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ValidationError
 
 from planner import FieldError, InvalidRequest, PlanRequest, Sampling, TooLarge, invalid, pointer, sample_count
 
-from .schemas import CompareBody, MotionBody
+from .schemas import CompareBody, MotionBody, RetimeBody
 from .settings import Caps
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -64,7 +64,7 @@ def refuse_above(count: int, most: int, what: str) -> None:
         raise TooLarge(what, most, f"{count:,} were sent; the library itself has no such cap")
 
 
-def included(body: MotionBody) -> tuple[str, ...]:
+def included(body: MotionBody | RetimeBody) -> tuple[str, ...]:
     """Return what the answer is to hold, in one order: by default the samples, in a comparison nothing."""
     default = () if isinstance(body, CompareBody) else ("samples",)
     asked = default if body.include is None else body.include
@@ -84,16 +84,34 @@ def to_request(body: MotionBody, caps: Caps, share: int = 1) -> tuple[PlanReques
     InvalidRequest, TooLarge
     """
     refuse_oversize(body.waypoints, caps)
-    if body.timeout is not None and body.timeout > caps.timeout:
-        raise InvalidRequest.of("/timeout", "out_of_range", f"may be at most {caps.timeout:g} s")
+    timeout = timeout_of(body, caps)
     names = {f.name for f in fields(PlanRequest)} & type(body).model_fields.keys() - _OURS
     given = body.model_dump(include=names, exclude_none=True)
-    given["timeout"] = caps.timeout if body.timeout is None else body.timeout
+    given["timeout"] = timeout
+    given["bound"] = "bound" in included(body)
     request = PlanRequest.of(body.waypoints, **given)
-    sampling = Sampling.of(None if body.sampling is None else body.sampling.model_dump(exclude_none=True))
+    sampling = sampling_of(body)
     if "samples" in included(body):
         _refuse_samples(request, sampling, caps.samples // share)
     return request, sampling
+
+
+def timeout_of(body: MotionBody | RetimeBody, caps: Caps) -> float:
+    """Return the seconds that the answer may take.
+
+    Raises
+    ------
+    InvalidRequest
+        More than the cap was asked for.
+    """
+    if body.timeout is not None and body.timeout > caps.timeout:
+        raise InvalidRequest.of("/timeout", "out_of_range", f"may be at most {caps.timeout:g} s")
+    return caps.timeout if body.timeout is None else body.timeout
+
+
+def sampling_of(body: MotionBody | RetimeBody) -> Sampling:
+    """Return where the answer is to be sampled."""
+    return Sampling.of(None if body.sampling is None else body.sampling.model_dump(exclude_none=True))
 
 
 def _refuse_samples(request: PlanRequest, sampling: Sampling, most: int) -> None:
@@ -107,7 +125,12 @@ def _refuse_samples(request: PlanRequest, sampling: Sampling, most: int) -> None
         if sampling.dt is not None:
             return
         least = 1.0  # any: the count does not depend on it
+    refuse_count(sampling, least, request.dims, most)
+
+
+def refuse_count(sampling: Sampling, least: float, dims: int, most: int) -> None:
+    """Refuse more samples of a trajectory that takes at least ``least`` seconds than the cap allows."""
     count = sample_count(sampling, least)
-    if count * request.dims > most:
-        hint = f"at least {count:,} samples of {request.dims} joints were asked; take fewer, or leave samples out"
+    if count * dims > most:
+        hint = f"at least {count:,} samples of {dims} joints were asked; take fewer, or leave samples out"
         raise TooLarge("samples x joints", most, hint)

@@ -227,3 +227,56 @@ class CertifyBody(Body):
     times: Times | None = Field(None, description="N increasing times of the waypoints, s; without: at any times")
     start: BoundaryBody | None = Field(None, description="State it should start with")
     end: BoundaryBody | None = Field(None, description="State it should end with")
+
+
+class StampBody(Body):
+    """A time of ROS 2."""
+
+    sec: Annotated[int, Field(strict=True, ge=-(2**31), lt=2**31)] = Field(0, description="Whole seconds")
+    nanosec: Annotated[int, Field(strict=True, ge=0, lt=10**9)] = Field(0, description="Nanoseconds, 0 to 999,999,999")
+
+
+class HeaderBody(Body):
+    """A header of ROS 2; the path does not depend on it."""
+
+    stamp: StampBody | None = Field(None, description="When it was made")
+    frame_id: Text | None = Field(None, description="Its frame")
+
+
+class PointBody(Body):
+    """A point of a ROS 2 JointTrajectory; empty lists count as not sent, as in the message."""
+
+    positions: Vector = Field(description="D positions")
+    velocities: Vector | None = Field(None, description="D velocities, unit/s: the path has their directions")
+    accelerations: Vector | None = Field(None, description="D accelerations, unit/s²")
+    effort: Annotated[list[Number], Field(max_length=0)] | None = Field(None, description="Must be empty")
+    time_from_start: StampBody | None = Field(None, description="Increasing; left out or zero everywhere: no times")
+
+
+class MotionTrajectoryBody(Body):
+    """Anyone's trajectory: a polynomial, samples, or a ROS 2 JointTrajectory (``points`` and ``joint_names``)."""
+
+    polynomial: PolynomialBody | None = Field(None, description="A piecewise polynomial; its path is followed exactly")
+    samples: SamplesBody | None = Field(None, description="Samples; the path passes all of them, or near to them")
+    header: HeaderBody | None = Field(None, description="Of a ROS 2 JointTrajectory")
+    joint_names: list[Text] | None = Field(None, description="Of a ROS 2 JointTrajectory: D names, used in the answer")
+    points: Annotated[list[PointBody], Field(fail_fast=True)] | None = Field(
+        None, description="Of a ROS 2 JointTrajectory: its M points"
+    )
+
+
+class RetimeBody(Body):
+    """A trajectory whose path is to be run through as fast as the limits allow."""
+
+    trajectory: MotionTrajectoryBody = Field(description="Exactly one of polynomial, samples and points")
+    limits: LimitsBody = Field(description="Limits on the answer: acceleration at least; with jerk it is jerk limited")
+    tolerance: Annotated[float, Field(strict=True, ge=0, le=MAX_VALUE, allow_inf_nan=False)] | None = Field(
+        None, description="Samples are smoothed: how far the path may be from each, in every joint; without: not at all"
+    )
+    duration: DurationBody | None = Field(None, description="Bounds of the duration, s")
+    joint_names: list[Text] | None = Field(None, description="D names, used by the ROS 2 and CSV formats")
+    sampling: SamplingBody | None = Field(None, description="Where to sample the answer; by default 200 samples")
+    include: Annotated[list[Included], Field(max_length=16)] | None = Field(
+        None, description="What the answer holds besides the certificate; by default the samples"
+    )
+    timeout: Seconds | None = Field(None, description="The caller's own limit on the computing time, s")

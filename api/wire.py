@@ -53,6 +53,12 @@ def certify_call(trajectory: Any, given: Mapping[str, Any]) -> Call:
     return Call("POST", "/v1/certificates", _body({"trajectory": _trajectory(trajectory), **given}))
 
 
+def retime_call(trajectory: Any, given: Mapping[str, Any], include: Sequence[str]) -> Call:
+    """Return the call that retimes a trajectory, a plan's result, samples or the contract's object."""
+    body = {"trajectory": _trajectory(trajectory), **given, "include": list(include)}
+    return Call("POST", "/v1/retimings", _body(body))
+
+
 def methods_call(name: str | None) -> Call:
     """Return the call that lists the methods or describes one."""
     return Call("GET", "/v1/methods" if name is None else f"/v1/methods/{urllib.parse.quote(name, safe='')}")

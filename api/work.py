@@ -5,11 +5,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from planner import METHODS, InvalidRequest, PlannerError, Row, Sampling, compare, plan, sample
+from planner import METHODS, InvalidRequest, Plan, PlannerError, Row, Sampling, compare, plan, retime, sample
 
 from . import encode
-from .reading import included, to_request
-from .schemas import CompareBody, MethodChoice, PlanBody
+from .reading import included, refuse_count, sampling_of, timeout_of, to_request
+from .retiming import own_fields, read_motion
+from .schemas import CompareBody, MethodChoice, PlanBody, RetimeBody
 from .settings import Caps
 
 #: Fields that the digest states in their canonical form instead.
@@ -37,28 +38,78 @@ def answer_plan(body: PlanBody, caps: Caps, media_type: str = encode.JSON) -> An
         Whatever the planner refuses with; ``InvalidRequest`` if the format holds samples and none are included.
     """
     started = time.perf_counter()
-    include, method = included(body), body.method or "auto"
-    if media_type != encode.JSON and "samples" not in include:
-        raise InvalidRequest.of("/include", "conflict", f"{media_type} holds samples, which are not included")
+    include, method = _included(body, media_type), body.method or "auto"
     request, sampling = to_request(body, caps)
     read = time.perf_counter()
     made = plan(request, method, body.options or {})
+    given = body.model_dump(exclude=_CANONICAL, exclude_none=True)
+    return _answer(made, method, sampling, include, given, caps, media_type, read - started)
+
+
+def answer_retiming(body: RetimeBody, caps: Caps, media_type: str = encode.JSON) -> Answer:
+    """Retime, sample and encode.
+
+    Raises
+    ------
+    PlannerError
+        As for a plan.
+    """
+    started = time.perf_counter()
+    include, timeout = _included(body, media_type), timeout_of(body, caps)
+    motion, names, dims = read_motion(body, caps)
+    sampling = sampling_of(body)
+    duration = None if body.duration is None else body.duration.model_dump(exclude_none=True)
+    if "samples" in include and sampling.dt is None:
+        refuse_count(sampling, 1.0, dims, caps.samples)  # any duration: the count does not depend on it
+    limits = body.limits.model_dump(exclude_none=True)
+    read = time.perf_counter()
+    with own_fields(body):
+        made = retime(
+            motion,
+            limits=limits,
+            tolerance=body.tolerance,
+            duration=duration,
+            joint_names=names,
+            timeout=timeout,
+            bound="bound" in include,
+        )
+    given = body.model_dump(exclude={"sampling", "include"}, exclude_none=True)
+    return _answer(made, "retiming", sampling, include, given, caps, media_type, read - started)
+
+
+def _included(body: PlanBody | RetimeBody, media_type: str) -> tuple[str, ...]:
+    include = included(body)
+    if media_type != encode.JSON and "samples" not in include:
+        raise InvalidRequest.of("/include", "conflict", f"{media_type} holds samples, which are not included")
+    return include
+
+
+def _answer(
+    made: Plan,
+    method: str,
+    sampling: Sampling,
+    include: tuple[str, ...],
+    given: Mapping[str, Any],
+    caps: Caps,
+    media_type: str,
+    reading: float,
+) -> Answer:
+    """Sample and encode; ``method`` and ``given`` are what was asked, ``reading`` the seconds before planning."""
     planned = time.perf_counter()
     samples = sample(made.trajectory, sampling, caps.samples) if "samples" in include else None
     if samples is not None and media_type != encode.JSON:
         encode.refuse_infinite(made.method, *encode.samples_tree(samples).values())
+        names = made.request.joint_names
         content = (
-            encode.to_csv(samples, request.joint_names)
+            encode.to_csv(samples, names)
             if media_type == encode.CSV
-            else encode.to_ros2(samples, request.joint_names, made.trajectory.start)
+            else encode.to_ros2(samples, names, made.trajectory.start)
         )
     else:
-        given = body.model_dump(exclude=_CANONICAL, exclude_none=True)
         digest = encode.digest_of(made, method, sampling, include, given)
         content = encode.dumps(encode.plan_tree(made, samples, "polynomial" in include, digest))
-    done = time.perf_counter()
-    seconds = {**made.seconds, "encode": done - planned}
-    seconds["validate"] = seconds.get("validate", 0.0) + read - started
+    seconds = {**made.seconds, "encode": time.perf_counter() - planned}
+    seconds["validate"] = seconds.get("validate", 0.0) + reading
     return Answer(content, media_type, seconds)
 
 

@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # the same names once more, for type checkers; a test holds b
     from .planning import Plan as Plan
     from .planning import pick as pick
     from .planning import plan as plan
+    from .retiming import retime as retime
     from .sampling import Samples as Samples
     from .sampling import sample as sample
     from .sampling import sample_count as sample_count
@@ -77,6 +78,7 @@ _HOME = {
     "methods": ("METHODS",),
     "options": ("MAX_TIME", "MAX_VALUE", "Options", "invalid", "pointer"),
     "planning": ("Plan", "pick", "plan"),
+    "retiming": ("retime",),
     "sampling": ("Samples", "sample", "sample_count"),
     "smoothing.stream": ("Stream",),
     "trajectory": ("Trajectory",),

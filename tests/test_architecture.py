@@ -23,12 +23,12 @@ LAYERS = [
     {"types"},
     {"curves", "solvers", "corridors"},
     {"paths"},
-    {"smoothing", "timing"},
+    {"smoothing", "timing", "fitting"},
     {"method", "verify", "bounds", "feasibility"},
     {"methods"},
     {"check"},
     {"sampling", "certification", "planning"},
-    {"comparison", "catalogue", "cases"},
+    {"comparison", "catalogue", "cases", "retiming"},
 ]
 RANK = {name: rank for rank, layer in enumerate(LAYERS) for name in layer}
 SOURCES = [p for name in ("planner", "problems", "api") for p in sorted((ROOT / name).rglob("*.py"))]

@@ -14,17 +14,18 @@ from planner import METHODS
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "minimum_jerk.md").read_text(encoding="utf-8")
-PYTHON = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE, re.S)
+RETIMING = (ROOT / "docs" / "retiming.md").read_text(encoding="utf-8")
+PYTHON = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE + RETIMING, re.S)
 BODIES = [json.loads(text) for text in re.findall(r"```json\n(.*?)```", PAGE, re.S)]
 REQUESTS = [body for body in BODIES if "waypoints" in body]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
-@pytest.mark.parametrize("number", range(PAGE.count("```python")))
+@pytest.mark.parametrize("number", range((PAGE + RETIMING).count("```python")))
 def test_python_prints_what_is_shown(number, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     code, shown = PYTHON[number]
-    exec(compile(code, "minimum_jerk.md", "exec"), {})
+    exec(compile(code, "docs", "exec"), {})
     assert capsys.readouterr().out == shown
 
 
@@ -48,6 +49,14 @@ def test_requests_are_answered_as_shown(number, service):
         assert [
             k for k, v in shown.items() if found[k] != (pytest.approx(v, rel=3e-4) if type(v) is float else v)
         ] == []
+
+
+def test_retimings_are_answered(service):
+    bodies = [json.loads(text) for text in re.findall(r"```json\n(.*?)```", RETIMING, re.S)]
+    assert bodies
+    for body in bodies:
+        answer = service.post("/v1/retimings", json=body)
+        assert answer.status_code == 200 and answer.json()["certificate"]["holds"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])

@@ -114,7 +114,7 @@ def test_what_is_not_json(service, problem, raw):
 
 
 @pytest.mark.parametrize("raw", [b"null", b"3", b'"text"', b"[]", b"true"])
-@pytest.mark.parametrize("path", [PLAN, "/v1/comparisons", "/v1/certificates", PLAN + "?shape=ruckig"])
+@pytest.mark.parametrize("path", [PLAN, "/v1/comparisons", "/v1/certificates", "/v1/retimings", PLAN + "?shape=ruckig"])
 def test_json_that_is_no_object(service, problem, raw, path):
     document = problem(post(service, raw, path), "invalid_request")
     assert document["errors"][0]["code"] == "wrong_type"
@@ -193,7 +193,7 @@ def test_millions_of_waypoints(service, problem, path, count, what):
     assert time.perf_counter() - started < 5
 
 
-@pytest.mark.parametrize("path", [PLAN, "/v1/comparisons", "/v1/certificates"])
+@pytest.mark.parametrize("path", [PLAN, "/v1/comparisons", "/v1/certificates", "/v1/retimings"])
 @pytest.mark.parametrize(
     "headers",
     [
@@ -259,7 +259,7 @@ def test_very_long_names_and_values(service, problem):
     problem(service.get("/" + "x" * 50_000), "not_found")
 
 
-@pytest.mark.parametrize("path", [PLAN, "/v1/comparisons", "/v1/certificates"])
+@pytest.mark.parametrize("path", [PLAN, "/v1/comparisons", "/v1/certificates", "/v1/retimings"])
 def test_unknown_query_parameters(service, problem, path):
     document = problem(post(service, GOOD, path + "?verbose=1"), "invalid_request")
     assert [(e["field"], e["code"]) for e in document["errors"]] == [("/?verbose", "unknown_field")]
