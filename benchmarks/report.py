@@ -19,17 +19,19 @@ from .markdown import number, table
 from .minimum_jerk.growth import draw
 from .minimum_jerk.rounds import Standing
 from .minimum_jerk.tables import section
+from .path_timing import Timing
+from .path_timing.tables import section as path_timing
 from .rows import Row
 from .service import PARTS, Split
 
-PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig", "spline-trajectory")
+PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig", "spline-trajectory", "copp-py")
 PACKAGES += ("qpsolvers", "piqp", "clarabel", "osqp", "daqp")
 
 INTRODUCTION = """# Benchmarks
 
 Our methods beside the documented calls of toppra (its quick start), ruckig (offline: one calculation a segment, from
 rest to rest) and scipy, on the same problems; minimum jerk also beside spline-trajectory, IPOPT and solvers of
-quadratic programs. Made by `make bench`.
+quadratic programs; laws along a path also beside copp-py and IPOPT. Made by `make bench`.
 
 - **Certified**: the answer keeps everything asked (limits, waypoints, rest at the ends) to 1e-6 relative, judged by our
   verification at the exact extrema of the pieces. A peer's answer is taken over piece by piece, not sampled. A peer
@@ -59,6 +61,7 @@ def write(
     rows: Sequence[Row],
     figures: Sequence[Figure],
     standings: Sequence[Standing],
+    timings: Sequence[Timing],
     splits: Sequence[Split],
     out: Path,
 ) -> Path:
@@ -67,15 +70,20 @@ def write(
     _csv(out / "rows.csv", [asdict(r) for r in rows])
     _csv(out / "kernels.csv", [{**asdict(f), "each_ns": f.each_ns, "met": f.met} for f in figures])
     _csv(out / "minimum_jerk.csv", [{**asdict(s), "each_ns": s.each_ns, "met": s.met} for s in standings])
+    _csv(out / "path_timing.csv", [{**asdict(t), "met": t.met} for t in timings])
     _csv(out / "service.csv", [{**asdict(s), "rest": s.rest} for s in splits])
     draw(standings, out)
     report = out / "report.md"
-    report.write_text(markdown(rows, figures, standings, splits), encoding="utf-8")
+    report.write_text(markdown(rows, figures, standings, timings, splits), encoding="utf-8")
     return report
 
 
 def markdown(
-    rows: Sequence[Row], figures: Sequence[Figure], standings: Sequence[Standing], splits: Sequence[Split]
+    rows: Sequence[Row],
+    figures: Sequence[Figure],
+    standings: Sequence[Standing],
+    timings: Sequence[Timing],
+    splits: Sequence[Split],
 ) -> str:
     """Return the report."""
     parts = [INTRODUCTION, machine(), "## Summary\n", SUMMARY, summary(rows)]
@@ -87,6 +95,8 @@ def markdown(
         parts += ["## Kernels and curves\n", KERNELS, _kernels(figures)]
     if standings:
         parts += [section(standings)]
+    if timings:
+        parts += [path_timing(timings)]
     if splits:
         parts += ["## Where a request's time goes\n", _service(splits)]
     return "\n".join(parts)

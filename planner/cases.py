@@ -87,6 +87,21 @@ CASES: dict[str, Case] = {
             },
         ),
         Case(
+            "pen_path",
+            "A pen along a fixed curve in the plane, as fast as its acceleration and its speed along the curve may be",
+            {
+                "waypoints": [[0, 0], [0.3, 0.4], [0.8, 0.4], [1.0, 0], [0.6, -0.3], [0, 0]],
+                "limits": {"velocity_norm": 1.0, "acceleration": 4.0},
+                "segment_limits": [None, {"velocity_norm": 0.5}, None, None, None],
+                "method": "time_optimal_path",
+            },
+        ),
+        Case(
+            "ur5e_path_jerk",
+            "UR5e pick and place along the cubic spline, as fast as velocity, acceleration and jerk limits allow",
+            {"waypoints": PICK_AND_PLACE, "limits": UR5E, "method": "time_optimal_path"},
+        ),
+        Case(
             "ur5e_jerk",
             "UR5e pick and place under velocity, acceleration and jerk limits",
             {"waypoints": PICK_AND_PLACE, "limits": UR5E},

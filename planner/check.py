@@ -57,7 +57,8 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     can, original = method.capabilities(options), request
     _refuse_unsupported(request, method, can, methods, options.control_points)
     _require(request, can)
-    refuse_empty_boxes(request)
+    if request.segment_limits is not None or request.limits.position is not None:
+        refuse_empty_boxes(request)
     _refuse_contradiction(request)
     spacing = options.spacing if isinstance(options, Spaced) else "centripetal"
     fixed = request.times is not None and can.timing == "given"
@@ -69,18 +70,21 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         if (turned != request.waypoints).any():
             notes.append(Note("turns_added", "waypoints of joints that wrap were moved by whole turns to the nearest"))
         request = original = replace(request, waypoints=turned)
-    if 0 < np.ptp(request.waypoints, axis=0).max() < TINY:
+    extent = float(np.ptp(request.waypoints, axis=0).max())
+    if 0 < extent < TINY:
         request = replace(request, waypoints=np.broadcast_to(request.waypoints[0], request.waypoints.shape).copy())
+        extent = 0.0
         notes.append(Note("moves_snapped", f"all waypoints lie within {TINY:g} of one another and were made equal"))
     if request.times is None and not options.control_points and not options.fixes_knots:
-        request, kept = _merged(request)
+        request, kept = _merged(request, extent)
         if len(request.waypoints) < len(kept):
             count = len(kept) - len(request.waypoints)
             notes.append(Note("waypoints_merged", f"{count} waypoint(s) equal to the one before were merged with it"))
     else:
         kept = np.arange(request.count)
     start, end = (_resolved(request, can, side) for side in ("start", "end"))
-    still = not np.ptp(request.waypoints, axis=0).any() and not _moving(start) and not _moving(end)
+    moving = _moving(start) or _moving(end)
+    still = not extent and not moving
     still = still and not options.moves_by_itself and not _moving_waypoints(request.waypoint_states)
     if still and options.model_fields_set:
         options.check(request.waypoints)
@@ -92,7 +96,8 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
             notes.append(Note("times_chosen", f"no times were given: spread {how} over the duration"))
     request = replace(request, start=start, end=end)
     timed = can.timing == "given" and request.times is not None
-    refuse_hopeless(request, not options.control_points, timed)
+    if timed or moving or _bounded_or_asked(request):
+        refuse_hopeless(request, not options.control_points, timed)
     demands = Demands(
         dims=request.dims,
         limits=request.limits,
@@ -109,6 +114,18 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         closed=can.continuity if options.closed else 0,
     )
     return Asked(request, demands, kept, still, tuple(notes))
+
+
+def _bounded_or_asked(request: PlanRequest) -> bool:
+    """Return whether a position is limited, or a state asked at a waypoint, so that it may break a limit by itself.
+
+    Rates are limited on both sides of zero: rest at the ends breaks none.
+    """
+    if request.segment_limits is not None or request.waypoint_states is not None:
+        return True
+    limits = request.limits
+    each = [x for x in (limits.velocity, limits.acceleration, limits.jerk) if x is not None]
+    return limits.position is not None or any((x.lower > 0).any() or (x.upper < 0).any() for x in each)
 
 
 def asked_words(request: PlanRequest) -> set[str]:
@@ -129,9 +146,12 @@ def _refuse_unsupported(
     refused = words - set(can.words)
     for side in ("start", "end"):
         taken: frozenset[str] = getattr(can, side)
-        if not _jerk_limited(request).all():
+        given = getattr(request, side).given()
+        if given and can.with_jerk and not _jerk_limited(request).all():
             taken -= can.with_jerk
-        refused |= {f"boundary_{name}" for name in getattr(request, side).given() if name not in taken}
+        refused |= {f"boundary_{name}" for name in given if name not in taken}
+        if request.waypoint_states is None:
+            continue
         rests = can.rests & set(_STATES)  # what is zero at the ends cannot be set there as a waypoint's state either
         refused |= {f"boundary_{n}" for n in rests if np.nan_to_num(_end_states(request, side)[n]).any()}
     if not refused:
@@ -150,7 +170,7 @@ def _require(request: PlanRequest, can: Capabilities) -> None:
     duration = request.duration
     if "times" in can.requires and request.times is None and not (duration is not None and duration.exact):
         raise InvalidRequest.of("/times", "missing", "the method needs times (or a duration with min equal to max)")
-    moving = np.ptp(request.waypoints, axis=0) > 0
+    moving = request.waypoints.min(axis=0) < request.waypoints.max(axis=0)
     for side in (request.start, request.end):
         for name in side.given():
             moving |= getattr(side, name) != 0
@@ -210,10 +230,15 @@ def _within(value: float, low: float, high: float) -> bool:
     return low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
 
 
-def _merged(request: PlanRequest) -> tuple[PlanRequest, NDArray[np.int64]]:
-    """Merge consecutive waypoints that are equal (or closer than rounding) on segments that may take no time."""
+def _merged(request: PlanRequest, extent: float) -> tuple[PlanRequest, NDArray[np.int64]]:
+    """Merge consecutive waypoints that are equal (or closer than rounding) on segments that may take no time.
+
+    ``extent``: the largest range of a joint, which rounding is relative to.
+    """
     points = request.waypoints
-    same = np.abs(np.diff(points, axis=0)).max(axis=1) <= SAME * float(np.ptp(points, axis=0).max())
+    same = np.abs(points[1:] - points[:-1]).max(axis=1) <= SAME * extent
+    if not same.any():
+        return request, np.arange(request.count)
     for i, bounds in enumerate(request.segment_durations or ()):
         if bounds is not None and bounds.min > 0:
             same[i] = False
@@ -292,7 +317,7 @@ def _resolved(request: PlanRequest, can: Capabilities, side: str) -> Boundary:
 def _end_states(request: PlanRequest, side: str) -> dict[str, Array]:
     """Return what the states at waypoints ask of the first or the last one, by derivative; NaN for a free joint."""
     if request.waypoint_states is None:
-        return {name: np.full(request.dims, np.nan) for name in _STATES}
+        return {}
     index = 0 if side == "start" else -1
     return {name: getattr(request.waypoint_states, name)[index] for name in _STATES}
 
@@ -320,4 +345,5 @@ def _jerk_limited(request: PlanRequest) -> NDArray[np.bool_]:
 
 
 def _moving(state: Boundary) -> bool:
-    return any(np.nan_to_num(getattr(state, name)).any() for name in state.given())
+    values = (getattr(state, name) for name in state.given())
+    return any(((x != 0) & ~np.isnan(x)).any() for x in values)

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .pieces import differentiated
 from .trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -16,49 +15,53 @@ JUMP = 1e-6
 GROWTH = 16.0
 
 
-def smoothness_lost(trajectory: Trajectory, order: int, peak: Array, span: float = 1.0) -> bool:
-    """Return whether a derivative jumps by more than rounding explains: what a curve's class is judged by.
+class Jumps:
+    """The jumps of a trajectory; what its derivatives are at the ends of its pieces is found once.
 
-    More lenient than ``counted_jumps``, by which limits are judged: where a derivative is nothing but rounding (that of
-    a straight line, say) its jumps do not count, however the curve was computed; not so in pieces much shorter than
-    their neighbours, which could hide anything.
+    Parameters
+    ----------
+    trajectory : Trajectory
+    span : float
+        What errors of positions are relative to.
     """
-    counted = counted_jumps(trajectory, order, peak, span)
-    if order == 0 or not counted.any():
-        return bool(counted.any())
-    left, right = trajectory.ends(order)
-    h = np.diff(trajectory.breaks)[:, None]
-    size = np.abs(np.concatenate(trajectory.ends(0))).max(axis=0)
-    noise = 64 * np.finfo(float).eps * GROWTH**order * size / np.maximum(h[1:], h[:-1]) ** order
-    return bool((counted & (np.abs(left[1:] - right[:-1]) > noise)).any())
+
+    def __init__(self, trajectory: Trajectory, span: float = 1.0) -> None:
+        self._trajectory, self._span = trajectory, span
+        self._ends: list[Array] = []
+
+    def ends(self, order: int) -> Array:
+        """Return the derivative at the left and at the right end of every piece, (2, K, D)."""
+        known = len(self._ends)
+        if order >= known:
+            found = self._trajectory.all_ends(known, max(order + 1, 4))
+            self._ends += [found[:, m] for m in range(found.shape[1])]
+        return self._ends[order]
+
+    def judged(self, order: int, peak: Array) -> tuple[NDArray[np.bool_], bool]:
+        """Return which jumps of a derivative at the interior breaks count, (K - 1, D), and if the curve is less smooth.
+
+        Positions: above 1e-6 x ``span``; other derivatives: above 1e-6 of their ``peak`` (D,) and above the rounding
+        of values and of the clock. By these limits are judged.
+
+        A curve's class is judged more leniently: where a derivative is nothing but rounding (that of a straight line,
+        say) its jumps do not make the curve less smooth, however it was computed; not so in pieces much shorter than
+        their neighbours, which could hide anything.
+        """
+        ends = self.ends(order)
+        jumps = np.abs(ends[0, 1:] - ends[1, :-1])
+        counted = jumps > (JUMP * self._span if order == 0 else JUMP * peak)
+        if order == 0 or not counted.any():  # most often nothing is near to a jump
+            return counted, bool(counted.any())
+        from .kernels.jumps import judge
+
+        trajectory, c = self._trajectory, self._trajectory.coefficients
+        if trajectory.weights is not None:  # where the denominator is small, so is what rounding is relative to
+            c = c / np.minimum(trajectory.weights[-1], trajectory.weights.sum(axis=0))[:, None]
+        near = (np.ascontiguousarray(self.ends(m)) for m in (order, order + 1, 0))
+        h = np.diff(trajectory.breaks)
+        return counted, bool(judge(c, trajectory.breaks, h, order, *near, peak, JUMP, GROWTH, counted))
 
 
 def counted_jumps(trajectory: Trajectory, order: int, peak: Array, span: float = 1.0) -> NDArray[np.bool_]:
-    """Return which jumps of a derivative at the interior breaks count, shape (K - 1, D).
-
-    Positions: above 1e-6 x ``span``; other derivatives: above 1e-6 of their ``peak`` (D,) and above the rounding of
-    values and of the clock.
-    """
-    if trajectory.pieces == 1:
-        return np.zeros((0, trajectory.dims), dtype=bool)
-    here, there = trajectory.ends(order)
-    jumps = np.abs(here[1:] - there[:-1])
-    if order == 0:
-        return np.asarray(jumps > JUMP * span)
-    eps, h = np.finfo(float).eps, np.diff(trajectory.breaks)[:, None]
-    c = np.abs(trajectory.coefficients)
-    if trajectory.weights is not None:  # where the denominator is small, so is what rounding is relative to
-        c = c / np.minimum(trajectory.weights[-1], trajectory.weights.sum(axis=0))[:, None]
-    size, position = c[:-1].max(axis=0, initial=0.0), c[-1]
-    own = differentiated(c, order).sum(axis=0) / h**order
-    rounding = 64 * eps * np.maximum(size / h**order, own)
-    floor = 1e3 * eps * position / h**order
-    noise = (own <= floor).all(axis=0)  # a joint that stands still but for rounding of where it stands
-    rounding = np.where(noise, np.maximum(rounding, floor), rounding)
-    tick = eps * np.abs(trajectory.breaks[1:-1, None])  # what the clock cannot tell moves a break, and scales pieces
-    peaks, rates = (np.maximum(np.abs(a[1:]), np.abs(b[:-1])) for a, b in ((here, there), trajectory.ends(order + 1)))
-    clock = tick * rates + order * tick / np.minimum(h[1:], h[:-1]) * peaks
-    stand = 8 * eps * position / h**order  # where it stands is rounded too; that may hide no large jump
-    stand = np.minimum(np.maximum(stand[1:], stand[:-1]), 1e-3 * peak)
-    allowed = np.maximum(rounding[1:], rounding[:-1]) + np.minimum(clock, 1e-2 * peak) + stand
-    return np.asarray(jumps > JUMP * peak + allowed)
+    """Return which jumps of a derivative at the interior breaks count, shape (K - 1, D): see ``Jumps``."""
+    return Jumps(trajectory, span).judged(order, peak)[0]

@@ -5,7 +5,7 @@ nothing. Bernstein coefficients have the same shape, the first belonging to u = 
 """
 
 from functools import cache
-from math import comb, factorial
+from math import comb, factorial, perm
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,12 @@ def owned(values: ArrayLike) -> Array:
     return np.array(values, dtype=np.float64, order="C")
 
 
+def frozen(values: Array) -> Array:
+    """Return the array itself, from now on read-only: a trajectory keeps such a one without a copy."""
+    values.setflags(write=False)
+    return values
+
+
 def finite(values: Array) -> bool:
     """Return whether all are finite; their sum costs no memory, but may overflow."""
     return bool(np.isfinite(values.sum()) or np.isfinite(values).all())
@@ -35,6 +41,23 @@ def differentiated(c: Array, order: int) -> Array:
         return np.zeros_like(c[:1])
     factors = [factorial(k) // factorial(k - order) for k in range(n, order - 1, -1)]
     return np.asarray(c[: n + 1 - order] * _along(np.array(factors, dtype=np.float64), c))
+
+
+def at_ends(c: Array, first: int, last: int, scale: Array | float = 1.0) -> Array:
+    """Return ``scale`` times the u-derivatives of order first … last - 1 at u = 0 and at u = 1, (2, R, K, D)."""
+    n, orders = len(c) - 1, last - first
+    out, factors = np.empty((2, orders, *c.shape[1:])), _falling(n, first, last)
+    for m in range(first, last):
+        out[0, m - first] = c[n - m] * factors[m - first, n - m] if m <= n else 0.0
+    np.matmul(factors, c.reshape(n + 1, -1), out=out[1].reshape(orders, -1))
+    out *= scale
+    return out
+
+
+@cache
+def _falling(n: int, first: int, last: int) -> Array:
+    """Return the factors k! / (k - m)! of the powers k = n … 0 in the derivatives of order m, (last - first, n + 1)."""
+    return np.array([[perm(k, m) for k in range(n, -1, -1)] for m in range(first, last)], dtype=np.float64)
 
 
 def raised(c: Array, degree: int) -> Array:
@@ -133,21 +156,19 @@ def composed(breaks: Array, c: Array, law_breaks: Array, law: Array) -> tuple[Ar
     InvalidRequest
         ``out_of_range`` where the law leaves the curve, ``not_increasing`` where it runs backwards.
     """
+    from .kernels.composition import compose
+
     _refuse_law(breaks, law)
     inner = crossings(law_breaks, law, breaks)
-    inner = np.unique(inner[~np.isin(inner, law_breaks)])
     if len(inner):
+        inner = np.unique(inner[inner < law_breaks[-1]])
+        inner = inner[law_breaks[np.searchsorted(law_breaks, inner)] != inner]
         law_breaks, law = cut(law_breaks, law, inner)
     middle = 0.5 * (law[-1] + law.sum(axis=0))
-    piece = np.clip(np.searchsorted(breaks, middle, side="right") - 1, 0, len(breaks) - 2)
-    h = np.diff(breaks)[piece]
-    w = law / h
-    w[-1] = (law[-1] - breaks[piece]) / h
-    result = c[:1, piece]
-    for k in range(1, len(c)):
-        result = product(result, w)
-        result[-1] += c[k, piece]
-    return law_breaks, result
+    piece = np.searchsorted(breaks[1:-1], middle, side="right")
+    out = np.empty(((len(c) - 1) * (len(law) - 1) + 1, len(piece), c.shape[2]))
+    compose(c, np.array(law), piece, breaks[piece], np.diff(breaks)[piece], out)
+    return law_breaks, frozen(out)
 
 
 def _refuse_law(breaks: Array, law: Array) -> None:

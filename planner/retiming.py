@@ -104,7 +104,12 @@ def retime(
         with np.errstate(all="ignore"):  # what overflows is refused, or does not verify
             route = _route(trajectory, tolerance, deadline)
         request = PlanRequest.of(
-            route.points, limits=limits, duration=duration, joint_names=joint_names, timeout=deadline.left(), bound=bound
+            route.points,
+            limits=limits,
+            duration=duration,
+            joint_names=joint_names,
+            timeout=deadline.left(),
+            bound=bound,
         )
         made = _told(_fastest(request, route, deadline), route)
     except InvalidRequest as error:

@@ -81,11 +81,9 @@ class Trajectory:
                 raise InvalidRequest.of("", "shape_mismatch", "expected weights (n + 1, K), as the coefficients")
             if not (np.isfinite(weights).all() and positive(arithmetic.to_bernstein(weights))):
                 raise InvalidRequest.of("", "bad_weights", "the denominator must be positive on every piece")
-            weights.setflags(write=False)
-            object.__setattr__(self, "weights", weights)
-        for name, array in (("breaks", breaks), ("coefficients", coefficients)):
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, "weights", arithmetic.frozen(weights))
+        object.__setattr__(self, "breaks", arithmetic.frozen(breaks))
+        object.__setattr__(self, "coefficients", arithmetic.frozen(coefficients))
 
     # -- making ------------------------------------------------------------------------------------------------------
 
@@ -134,8 +132,7 @@ class Trajectory:
 
         out = np.empty((2 * len(states) + 2, len(breaks) - 1, points.shape[1]))
         hermite_pieces(np.diff(breaks), points, states, out)
-        out.setflags(write=False)
-        return cls(breaks, out)
+        return cls(breaks, arithmetic.frozen(out))
 
     @classmethod
     def concatenate(cls, parts: Sequence["Trajectory"]) -> "Trajectory":
@@ -195,7 +192,7 @@ class Trajectory:
         if below is None:
             below = np.zeros(self.coefficients.shape[:2])
             below[-1] = 1.0
-        return np.concatenate([self.coefficients, below[:, :, None]], axis=2)
+        return arithmetic.frozen(np.concatenate([self.coefficients, below[:, :, None]], axis=2))
 
     @cached_property
     def rational(self) -> bool:
@@ -268,14 +265,16 @@ class Trajectory:
 
     def ends(self, order: int) -> tuple[Array, Array]:
         """Return the derivative at the left and at the right end of every piece, each (K, D)."""
-        scale = (self.rates**order)[:, None]
+        left, right = self.all_ends(order, order + 1)[:, 0]
+        return left, right
+
+    def all_ends(self, first: int, last: int) -> Array:
+        """Return the derivatives of order first … last - 1 at the left and right ends, (2, last - first, K, D)."""
+        scale = (self.rates ** np.arange(first, last)[:, None])[:, :, None]
         if not self.rational:
-            c = arithmetic.differentiated(self.coefficients, order)
-            return c[-1] * scale, c.sum(axis=0) * scale
-        found = [arithmetic.differentiated(self._homogeneous, m) for m in range(order + 1)]
-        left, right = np.stack([c[-1] for c in found]), np.stack([c.sum(axis=0) for c in found])
-        at_left, at_right = (quotient(x[..., :-1], x[..., -1])[order] for x in (left, right))
-        return at_left * scale, at_right * scale
+            return arithmetic.at_ends(self.coefficients, first, last, scale)
+        both = arithmetic.at_ends(self._homogeneous, 0, last)
+        return np.stack([quotient(x[..., :-1], x[..., -1])[first:] * scale for x in both])
 
     def jumps(self, order: int) -> Array:
         """Return the jumps of a derivative at the interior breaks, shape (K - 1, D)."""
@@ -310,7 +309,7 @@ class Trajectory:
         c = arithmetic.differentiated(self.coefficients, order)
         power = np.arange(len(c) - 1, -1, -1)
         gram = 1.0 / (power[:, None] + power[None, :] + 1.0)
-        squares = np.einsum("kid,kl,lid->i", c, gram, c)
+        squares = np.einsum("kid,kid->i", c, (gram @ c.reshape(len(c), -1)).reshape(c.shape))
         return float(np.sum(squares * self.rates ** (2 * order - 1)))
 
     # -- changing ----------------------------------------------------------------------------------------------------
@@ -364,9 +363,9 @@ class Trajectory:
 
     def split(self, times: ArrayLike) -> "Trajectory":
         """Return the same trajectory with further breaks at ``times``; those outside or at a break change nothing."""
-        extra = np.unique(np.asarray(times, dtype=np.float64))
-        extra = extra[(extra > self.start) & (extra < self.end)]
-        extra = extra[~np.isin(extra, self.breaks)]
+        extra = np.asarray(times, dtype=np.float64)
+        extra = extra[self.breaks[np.minimum(np.searchsorted(self.breaks, extra), self.pieces)] != extra]
+        extra = np.unique(extra[(extra > self.start) & (extra < self.end)])
         if not len(extra):
             return self
         return self._like(*arithmetic.cut(self.breaks, self._homogeneous, extra))
@@ -391,7 +390,10 @@ class Trajectory:
         """
         if law.dims != 1 or law.rational:
             raise InvalidRequest.of("law", "shape_mismatch", "a time law has one joint and no weights")
-        return self._like(*arithmetic.composed(self.breaks, self._homogeneous, law.breaks, law.coefficients[:, :, 0]))
+        run = law.breaks, law.coefficients[:, :, 0]
+        if self.weights is None:
+            return Trajectory(*arithmetic.composed(self.breaks, self.coefficients, *run))
+        return self._like(*arithmetic.composed(self.breaks, self._homogeneous, *run))
 
     def _like(self, breaks: Array, whole: Array) -> "Trajectory":
         """Return a trajectory from coefficients, which hold a denominator where this one has one."""

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .corridors import norm_row, polyline_distance, tolerance_row, tube_row
-from .jumps import counted_jumps, smoothness_lost
+from .jumps import Jumps
 from .limits import QUANTITIES, Boundary, DurationBounds, Limit, magnitude, segment_bounds
-from .quadrature import integral
+from .quadrature import NODES, WEIGHTS, integral, integral_of
 from .rational import noise_of
 from .trajectory import Trajectory
 from .types import TOLERANCE, Certificate, Check, Demands, Followed
@@ -47,7 +47,7 @@ def verify(
     at = demands.times if demands.times is not None else waypoint_times
     inner = trajectory if at is None else trajectory.split(at)
     motion = _measure(inner, demands, at)
-    missed = _missed(inner, demands, at)
+    missed = _missed(motion, at)
     checks = _limit_rows(motion)
     checks += [row] if (row := norm_row(inner, demands, motion.segment, motion.jumps[1])) is not None else []
     checks += _duration_rows(trajectory, demands, at)
@@ -62,22 +62,22 @@ def verify(
     ]
     if path is None and demands.tube is not None and demands.waypoints is not None and missed is not None:
         deviation = polyline_distance(inner, demands.waypoints, motion.segment)  # told; what is judged is the tube
-    jerk_bounded = not motion.unbounded[3].any()
+    unbounded = np.asarray(motion.jumps.any(axis=1))  # which derivatives are so somewhere, (4, D)
     return Certificate(
         holds=all(c.holds for c in checks) and all(e is None or e <= TOLERANCE for e in errors),
         basis="enclosure" if trajectory.rational else "exact",
         checks=tuple(checks),
         waypoint_error=waypoint_error,
         boundary_error=boundary_error,
-        continuity=_continuity(trajectory, motion.span),
+        continuity=_continuity(trajectory, motion),
         path_deviation=deviation,
         cost={
-            "squared_jerk": trajectory.squared_integral(3) if jerk_bounded else None,
+            "squared_jerk": None if unbounded[3].any() else trajectory.squared_integral(3),
             "path_length": path_length(trajectory),
         },
         peaks={
-            name: tuple(None if bad else float(v) for v, bad in zip(motion.peaks[m], motion.unbounded[m], strict=True))
-            for m, name in enumerate(QUANTITIES)
+            name: tuple(None if bad else v for v, bad in zip(values, jumping, strict=True))
+            for name, values, jumping in zip(QUANTITIES, motion.peaks.tolist(), unbounded.tolist(), strict=True)
         },
     )
 
@@ -92,24 +92,28 @@ class _Motion:
     span: float  # what errors of positions are relative to
     peaks: Array  # (4, D)
     jumps: NDArray[np.bool_]  # (4, K - 1, D): at which breaks a lower derivative jumps, so that this one is unbounded
+    judge: Jumps
+    lost: tuple[bool, ...]  # whether the position, velocity and acceleration jump by more than rounding explains
 
-    @property
-    def unbounded(self) -> NDArray[np.bool_]:
-        """Which derivatives are unbounded somewhere, (4, D)."""
-        return np.asarray(self.jumps.any(axis=1))
+    def end(self, order: int, index: int) -> Array:
+        """Return a derivative at the start (index 0) or at the end (-1), (D,)."""
+        return np.asarray(self.judge.ends(order)[index, index])
 
 
 def _measure(trajectory: Trajectory, demands: Demands, at: Array | None) -> _Motion:
     highest = peaks(trajectory, 4)
     span = position_span(trajectory if demands.waypoints is None else demands.waypoints)
-    jumps = np.zeros((4, trajectory.pieces - 1, trajectory.dims), dtype=bool)
+    judge, jumps = Jumps(trajectory, span), np.zeros((4, trajectory.pieces - 1, trajectory.dims), dtype=bool)
+    lost = []
     for m in range(3):
-        jumps[m + 1] = jumps[m] | counted_jumps(trajectory, m, highest[m], span)
+        counted, smoothness_lost = judge.judged(m, highest[m])
+        np.logical_or(jumps[m], counted, out=jumps[m + 1])
+        lost.append(smoothness_lost)
     segment = np.zeros(trajectory.pieces, dtype=np.int64)
     if at is not None:
         middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
         segment = np.clip(np.searchsorted(at, middles, side="right") - 1, 0, max(len(at) - 2, 0))
-    return _Motion(trajectory, demands, segment, span, highest, jumps)
+    return _Motion(trajectory, demands, segment, span, highest, jumps, judge, tuple(lost))
 
 
 def position_span(points: Array | Trajectory) -> float:
@@ -119,20 +123,26 @@ def position_span(points: Array | Trajectory) -> float:
     return max(1.0, float(np.ptp(points, axis=0).max()))
 
 
-def _continuity(trajectory: Trajectory, span: float) -> int | None:
+def _continuity(trajectory: Trajectory, motion: _Motion) -> int | None:
     """Return the class: the highest order up to which nothing jumps; -1 if the position does.
 
     None for one piece, and for pieces of one and the same polynomial.
     """
     if trajectory.pieces == 1:
         return None
-    if not trajectory.rational:
-        highest = list(peaks(trajectory, trajectory.degree + 1))
-    else:  # the scale of a derivative is all that counts here
-        ends = (np.abs(trajectory.ends(m)) for m in range(trajectory.degree + 1))
-        highest = [e.max(axis=(0, 1)) for e in ends]
-    for order, peak in enumerate(highest):
-        if smoothness_lost(trajectory, order, peak, span):
+    same = motion.trajectory is trajectory
+    judge, highest = motion.judge if same else Jumps(trajectory, motion.span), motion.peaks
+    for order in range(trajectory.degree + 1):
+        if same and order < len(motion.lost):
+            lost = motion.lost[order]
+        elif order < len(highest) and not trajectory.rational:
+            lost = judge.judged(order, highest[order])[1]
+        else:
+            lost = judge.judged(order, np.abs(judge.ends(order)).max(axis=(0, 1)))[1]
+            if lost and not trajectory.rational:  # the larger the peak, the less is a jump; most often none is near
+                highest = peaks(trajectory, trajectory.degree + 1)
+                lost = judge.judged(order, highest[order])[1]
+        if lost:
             return order - 1
     return trajectory.degree if trajectory.rational else None
 
@@ -140,23 +150,30 @@ def _continuity(trajectory: Trajectory, span: float) -> int | None:
 def _limit_rows(motion: _Motion) -> list[Check]:
     """Return a row for every limited quantity: the worst joint, segment and time."""
     demands = motion.demands
-    segments = 1 if demands.segment_limits is None else len(demands.segment_limits)
-    row = np.minimum(motion.segment, segments - 1)
-    each = [
-        segment_bounds(demands.limits, demands.segment_limits, m, segments, demands.dims)
-        for m in range(len(QUANTITIES))
-    ]
-    limited = [bool((np.isfinite(x.lower[row]) | np.isfinite(x.upper[row])).any()) for x in each]
+    if demands.segment_limits is None:
+        row, present = np.zeros_like(motion.segment), np.zeros(1, dtype=np.int64)
+        bounds = (demands.limits.bounds(m, demands.dims) for m in range(len(QUANTITIES)))
+        each = [Limit(x.lower[None], x.upper[None]) for x in bounds]
+    else:
+        segments = len(demands.segment_limits)
+        row = np.minimum(motion.segment, segments - 1)
+        present = np.unique(row)
+        each = [
+            segment_bounds(demands.limits, demands.segment_limits, m, segments, demands.dims)
+            for m in range(len(QUANTITIES))
+        ]
+    lower, upper = np.array([x.lower for x in each]), np.array([x.upper for x in each])  # (4, S, D)
+    limited = (np.isfinite(lower) | np.isfinite(upper))[:, present].any(axis=(1, 2)).tolist()
     if not any(limited):
         return []
-    lower, upper = np.stack([x.lower for x in each]), np.stack([x.upper for x in each])  # (4, S, D)
-    scale = np.stack([magnitude(x.lower, x.upper) for x in each])
-    distance, ratio = measures(lower, upper, scale), measures(lower, upper, None)
-    for by_ratio, by_distance in zip(ratio, distance, strict=True):  # for derivatives the ratio says more
-        by_ratio[:, 0] = by_distance[:, 0]
+    ratio, lopsided = measures(lower, upper, None), bool((lower[1:] != -upper[1:]).any())
+    if limited[0] or lopsided:
+        distance = measures(lower, upper, np.array([magnitude(x.lower, x.upper) for x in each]))
+        for by_ratio, by_distance in zip(ratio, distance, strict=True):  # for derivatives the ratio says more
+            by_ratio[:, 0] = by_distance[:, 0]
     told = worst(motion.trajectory, *ratio, row)
     excess = told.most - np.array([0.0, 1.0, 1.0, 1.0])[:, None]
-    if (lower[1:] != -upper[1:]).any():  # what counts is the distance over the larger side
+    if lopsided:  # what counts is the distance over the larger side
         excess = worst(motion.trajectory, *distance, row).most
     return [
         _limit_row(motion, each[m], row, m, told, bool(excess[m].max() <= TOLERANCE))
@@ -231,28 +248,36 @@ def _corridor_rows(motion: _Motion, missed: Array | None, at: Array | None) -> l
     return [row for row in rows if row is not None]
 
 
-def _missed(trajectory: Trajectory, demands: Demands, at: Array | None) -> Array | None:
+def _missed(motion: _Motion, at: Array | None) -> Array | None:
     """Return the distances from the waypoints at their times, from the side that is further off, (N, D).
 
     The trajectory has breaks at the times. None where there are no such times, or they are not the trajectory's.
     """
+    trajectory, demands = motion.trajectory, motion.demands
     if demands.waypoints is None or at is None:
         return None
     slack = 1e-9 * max(1.0, trajectory.duration)
     inside = (at >= trajectory.start - slack) & (at <= trajectory.end + slack)
     if len(at) != len(demands.waypoints) or not inside.all() or (np.diff(at) < 0).any():
         return None
-    return np.asarray(np.abs(_on_both_sides(trajectory, at, 0) - demands.waypoints).max(axis=0))
+    return np.asarray(np.abs(_on_both_sides(motion, at, 0) - demands.waypoints).max(axis=0))
 
 
-def _on_both_sides(trajectory: Trajectory, at: Array, order: int) -> Array:
+def _on_both_sides(motion: _Motion, at: Array, order: int) -> Array:
     """Return a derivative at times, from the right and from the left of them, (2, N, D)."""
+    trajectory, pieces = motion.trajectory, motion.trajectory.pieces
+    index = np.searchsorted(trajectory.breaks, at)
+    if (trajectory.breaks[np.minimum(index, pieces)] == at).all():  # as is usual: no time is beyond the clock
+        starts, stops = motion.judge.ends(order)
+        right, left = starts[np.minimum(index, pieces - 1)], stops[np.maximum(index - 1, 0)]
+        right[index == pieces], left[index == 0] = stops[-1], starts[0]
+        return np.stack([right, left])
     right = trajectory(np.clip(at, trajectory.start, trajectory.end), order)
     left = right.copy()
-    before = np.searchsorted(trajectory.breaks, at) - 1  # the piece that ends there, if one does
-    ends = (before >= 0) & (trajectory.breaks[np.minimum(before + 1, trajectory.pieces)] == at)
+    before = index - 1  # the piece that ends there, if one does
+    ends = (before >= 0) & (trajectory.breaks[np.minimum(index, pieces)] == at)
     if ends.any():
-        left[ends] = trajectory.ends(order)[1][before[ends]]
+        left[ends] = motion.judge.ends(order)[1, before[ends]]
     return np.stack([right, left])
 
 
@@ -281,21 +306,21 @@ def _boundary_error(motion: _Motion, at: Array | None) -> float | None:
     for boundary, index in ends:
         for order, name in enumerate(QUANTITIES):
             if getattr(boundary, name, None) is not None:
-                left, right = motion.trajectory.ends(order)
-                asked.append((order, getattr(boundary, name), (left if index == 0 else right)[index]))
+                asked.append((order, getattr(boundary, name), motion.end(order, index)))
     for order in range(1, min(demands.closed, len(QUANTITIES) - 1) + 1):
-        left, right = motion.trajectory.ends(order)
-        asked.append((order, left[0], right[-1]))
+        asked.append((order, motion.end(order, 0), motion.end(order, -1)))
     states = demands.waypoint_states
     if states is not None:
         if at is None:
             return float("inf")
         for order, rows in ((1, states.velocity), (2, states.acceleration)):
-            asked.append((order, rows, _on_both_sides(motion.trajectory, at, order)))
+            asked.append((order, rows, _on_both_sides(motion, at, order)))
+    relative = {
+        m: np.maximum(np.maximum(1.0, demands.limits.bounds(m, demands.dims).scale()), motion.peaks[m])
+        for m in {order for order, _, _ in asked}
+    }
     for order, wanted, reached in asked:
-        limit = demands.limits.bounds(order, demands.dims).scale()
-        relative = np.maximum(np.maximum(1.0, limit), motion.peaks[order])
-        off = np.abs(reached - wanted) / relative
+        off = np.abs(reached - wanted) / relative[order]
         errors.append(float(off[~np.isnan(np.broadcast_to(wanted, off.shape))].max(initial=0.0)))
     return max(errors, default=None)
 
@@ -306,11 +331,16 @@ def _path_deviation(trajectory: Trajectory, path: Followed) -> float:
     Both sides are polynomials on the common pieces; more nodes than their degree cannot all hide a difference.
     """
     curve, law = path.curve, path.law
-    rate = law.extrema(2)
-    if -float(rate.low[1].min()) > TOLERANCE * float(rate.high[1].max()):
+    slowest, fastest = _rates(law)
+    if -slowest > TOLERANCE * fastest:
         return float("inf")
     nodes = 2 * max(trajectory.degree, curve.degree * law.degree) + 3  # for quotients: of both denominators
     u = 0.5 - 0.5 * np.cos(np.pi * np.arange(nodes) / (nodes - 1))
+    if not (trajectory.rational or curve.rational or law.rational):
+        from .kernels.deviation import largest_deviation
+
+        each = ((x.breaks, x.coefficients) for x in (trajectory, law, curve))
+        return float(largest_deviation(*(array for pair in each for array in pair), u))
     breaks = np.union1d(trajectory.breaks, np.clip(law.breaks, trajectory.start, trajectory.end))
     times = (breaks[:-1, None] + np.diff(breaks)[:, None] * u).reshape(-1)
     times = np.clip(times, max(trajectory.start, law.start), min(trajectory.end, law.end))
@@ -318,22 +348,31 @@ def _path_deviation(trajectory: Trajectory, path: Followed) -> float:
     return float(np.linalg.norm(trajectory(times) - curve(s), axis=1).max())
 
 
+def _rates(law: Trajectory) -> tuple[float, float]:
+    """Return the slowest and the fastest rate of a law."""
+    if law.rational:
+        found = law.extrema(2)
+        return float(found.low[1].min()), float(found.high[1].max())
+    from .kernels.extrema import extrema
+
+    low, _, high, _ = extrema(law.coefficients, 2)[:, 1, :, 0] * law.rates
+    return float(low.min()), float(high.max())
+
+
 def path_length(trajectory: Trajectory) -> float:
     """Return the integral of the Euclidean norm of the velocity, to about 1e-10 relative."""
     if trajectory.degree == 0 or trajectory.duration == 0.0:
         return 0.0
-    slopes = trajectory.coefficients[:-1] * np.arange(trajectory.degree, 0, -1.0)[:, None, None]  # d/du
-    noise = 64 * np.finfo(float).eps * np.sqrt((np.abs(slopes).sum(axis=0) ** 2).sum(axis=1))
     if trajectory.rational:
         return _rational_length(trajectory)
     from .kernels.speed import speeds
 
-    def speed(piece: NDArray[np.int64], u: Array) -> Array:
-        out = np.empty_like(u)
-        speeds(slopes, piece, u, out)
+    def look(piece: NDArray[np.int64], left: Array, width: Array) -> Array:
+        out = np.empty((6, len(piece)))
+        speeds(trajectory.coefficients, piece, left, width, NODES, WEIGHTS, out)
         return out
 
-    return integral(speed, trajectory.pieces, noise)
+    return integral_of(look, trajectory.pieces)
 
 
 def _rational_length(trajectory: Trajectory) -> float:

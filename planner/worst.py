@@ -58,7 +58,13 @@ def peaks(trajectory: Trajectory, orders: int) -> Array:
     """Return the largest magnitude of the derivatives of order 0 … orders - 1, (orders, D)."""
     gain = np.ones((2, orders, 1, trajectory.dims))
     gain[1] = -1.0
-    return np.maximum(worst(trajectory, gain, np.zeros_like(gain)).most, 0.0)
+    if trajectory.rational:
+        return np.maximum(worst(trajectory, gain, np.zeros_like(gain)).most, 0.0)
+    from .kernels.worst import worst as kernel
+
+    row = np.zeros(trajectory.pieces, dtype=np.int64)
+    most = kernel(trajectory.coefficients, trajectory.rates, row, gain, np.zeros_like(gain))[5]
+    return np.asarray(np.maximum(most, 0.0))
 
 
 def measures(lower: Array, upper: Array, scale: Array | None = None) -> tuple[Array, Array]:
@@ -66,7 +72,7 @@ def measures(lower: Array, upper: Array, scale: Array | None = None) -> tuple[Ar
 
     With ``scale`` (R, S, D), by the distance beyond the side over that.
     """
-    sides = np.stack([upper, lower])
+    sides = np.array([upper, lower])
     bounded = np.isfinite(sides)
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.abs(sides) if scale is None else scale

@@ -15,13 +15,14 @@ from planner import METHODS
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "minimum_jerk.md").read_text(encoding="utf-8")
 RETIMING = (ROOT / "docs" / "retiming.md").read_text(encoding="utf-8")
-PYTHON = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE + RETIMING, re.S)
-BODIES = [json.loads(text) for text in re.findall(r"```json\n(.*?)```", PAGE, re.S)]
+TIMING = (ROOT / "docs" / "time_optimal_path.md").read_text(encoding="utf-8")
+PYTHON = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE + RETIMING + TIMING, re.S)
+BODIES = [json.loads(text) for text in re.findall(r"```json\n(.*?)```", PAGE + TIMING, re.S)]
 REQUESTS = [body for body in BODIES if "waypoints" in body]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
-@pytest.mark.parametrize("number", range((PAGE + RETIMING).count("```python")))
+@pytest.mark.parametrize("number", range((PAGE + RETIMING + TIMING).count("```python")))
 def test_python_prints_what_is_shown(number, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     code, shown = PYTHON[number]

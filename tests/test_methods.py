@@ -16,6 +16,7 @@ ASYMMETRIC = {
     "acceleration": {"lower": -2.0, "upper": [3.0, 2.5, 2.0]},
 }
 STATE = {"velocity": [0.1, -0.2, 0.0]}
+LINE = [[0.0, 0.0, 1.0], [0.5, 1.0, 0.5], [2.0, 4.0, -1.0], [2.5, 5.0, -1.5]]
 
 REQUESTS = {
     **{
@@ -91,6 +92,18 @@ REQUESTS = {
         "start": {**STATE, "acceleration": [0.5, 0, 0]},
         "end": STATE,
     },
+    "moving_along_a_line": {
+        "waypoints": LINE,
+        "limits": {"velocity": 1.0, "acceleration": 3.0, "jerk": 30.0},
+        "start": {"velocity": [0.1, 0.2, -0.1], "acceleration": [0.05, 0.1, -0.05]},
+        "end": {"velocity": [0.2, 0.4, -0.2], "acceleration": [-0.1, -0.2, 0.1]},
+    },
+    "moving_along_a_line_without_jerk": {
+        "waypoints": LINE,
+        "limits": {"velocity": 1.0, "acceleration": 3.0},
+        "start": {"velocity": [0.1, 0.2, -0.1]},
+        "end": {"velocity": [0.2, 0.4, -0.2]},
+    },
     "still": {"waypoints": [[1, 2, 3]] * 3, "limits": {"velocity": 1.0, "acceleration": 3.0}},
     "still_times": {"waypoints": [[1, 2, 3]] * 3, "times": [0, 1, 2]},
     "mixed_scales": {"waypoints": [[0, 0, 0], [1e6, 1e-9, 1e-16]], "limits": {"velocity": 1e3, "acceleration": 1e4}},
@@ -103,6 +116,18 @@ REQUESTS = {
         "waypoint_states": [None, {"velocity": [0, None, 1]}, None, None, None, None],
     },
     "norm": {"waypoints": POINTS, "limits": {"acceleration": 3.0, "velocity_norm": 1.0}},
+    "norm_and_all": {
+        "waypoints": POINTS,
+        "limits": {
+            "position": {"lower": -3, "upper": 3},
+            "velocity": {"lower": -0.8, "upper": 0.9},
+            "acceleration": 3.0,
+            "jerk": 30.0,
+            "velocity_norm": 1.0,
+        },
+        "segment_limits": [{"velocity_norm": 0.5}, None, {"acceleration": 1.0}, None, {"jerk": 10.0, "velocity": 0.4}],
+        "duration": {"min": 12, "max": 12},
+    },
     "torque": {"waypoints": POINTS, "limits": {"acceleration": 3.0, "torque": 1.0}},
     "jerk_at_both_ends": {
         "waypoints": POINTS,
@@ -127,6 +152,8 @@ REQUESTS = {
     },
     "robot": {"waypoints": POINTS, "times": TIMES, "robot": {"model": "ur5e"}},
 }
+#: They need nothing but limits.
+TIMING_BY_LIMITS = ("trapezoidal", "ruckig", "time_scaled", "toppra", "time_optimal_path", "time_optimal_nlp")
 
 ROWS = [(m.id, i, dict(v)) for m in METHODS.values() for i, v in enumerate(({}, *m.variants))]
 
@@ -151,7 +178,11 @@ def must_accept(request, can):
 
 def excused(method, options, request):
     """What no honest answer exists for: a periodic spline through open points, uniform scaling with nothing to keep,
-    fewer points than a degree needs, Bézier segments that the points do not make or that are not joined as asked."""
+    fewer points than a degree needs, Bézier segments that the points do not make or that are not joined as asked, a
+    fixed path entered or left in another direction than its own."""
+    if METHODS[method].path == "fixed" and (request.start.given() or request.end.given()):
+        if np.linalg.matrix_rank(np.diff(request.waypoints, axis=0)) > 1:
+            return True
     if options.get("boundary") == "periodic":
         return (request.waypoints[0] != request.waypoints[-1]).any() or request.count < 3
     if options.get("ends") == "periodic" and (request.waypoints[0] != request.waypoints[-1]).any():
@@ -243,7 +274,7 @@ def test_every_honoured_word_is_exercised(method):
 def test_compare_keeps_order_and_turns_refusals_into_rows():
     rows = compare(request_of("velocity_acceleration"))
     assert [r.method for r in rows] == list(METHODS)
-    assert {r.method for r in rows if r.plan} == {"trapezoidal", "ruckig", "time_scaled", "toppra", "time_optimal_nlp"}
+    assert {r.method for r in rows if r.plan} == {*TIMING_BY_LIMITS}
     assert all((r.plan is None) != (r.error is None) for r in rows)
 
 

@@ -148,13 +148,14 @@ def _value(steps, abc, price, ends, y):  # type: ignore[no-untyped-def]
     value = time_taken(steps, abc, price)
     for side in range(2):
         if ends[side, 0] > 0.0:
-            value += price[0] * ends[side, 1] / np.sqrt(ends[side, 0] * y[1 if side == 0 else len(y) - 2])
+            a = ends[side, 0] * y[1 if side == 0 else len(y) - 2]
+            value += price[0] * ends[side, 1] / np.sqrt(a) + price[1] * ends[side, 3] * a * np.sqrt(a)
     return value
 
 
 @njit(cache=True, error_model="numpy")
 def solve_profile(  # type: ignore[no-untyped-def]
-    sizes, steps, maps, fixed, e, inverse, over_caps, ends, price, y, lam, single, start, tolerance, most
+    sizes, steps, maps, fixed, e, inverse, over_caps, ends, price, y, lam, single, start, centring, tolerance, most
 ):
     """Improve a strictly feasible profile to the optimum.
 
@@ -172,9 +173,10 @@ def solve_profile(  # type: ignore[no-untyped-def]
         1 / limit above, 1 / limit below; 0 where there is none.
     over_caps : (W,)
         1 / upper bound of A.
-    ends : (2, 3)
+    ends : (2, 4)
         Of a rest at the first and last station: the multiple k of the outermost free coefficient that a has at the
-        station next to it (0: no rest), the time e in e / sqrt(k y), the upper bound of k y.
+        station next to it (0: no rest), the time e in e / sqrt(k y), the upper bound of k y, and the squared path
+        acceleration's integral f in f (k y)^(3/2).
     price : (2,)
         p and g: the price of time, and that of squared path acceleration.
     y : (m + 2,)
@@ -183,6 +185,8 @@ def solve_profile(  # type: ignore[no-untyped-def]
         On exit the multipliers of rows and caps; of the end caps and y >= 0.
     start : float
         The complementarity to begin with, as a share of the objective by row.
+    centring : float
+        The least share of the complementarity that an iteration aims at; 1: the iterates go to the centre.
     tolerance : float
         Of the gap and the stationarity, relative to the objective.
 
@@ -230,7 +234,9 @@ def solve_profile(  # type: ignore[no-untyped-def]
             if counts[side]:
                 i = last[side]
                 time = price[0] * ends[side, 1] / np.sqrt(ends[side, 0] * y[i])
-                gradient[i] -= 0.5 * time / y[i]
+                effort = price[1] * ends[side, 3] * (ends[side, 0] * y[i]) ** 1.5
+                gradient[i] += (1.5 * effort - 0.5 * time) / y[i]
+                h0[i] += 0.75 * effort / (y[i] * y[i])
                 h0[i] += 0.75 * time / (y[i] * y[i]) + single[side] / v[side] * (ends[side, 0] / ends[side, 2]) ** 2
         for i in range(size):
             if fixed[i]:
@@ -279,7 +285,7 @@ def solve_profile(  # type: ignore[no-untyped-def]
             length = min(1.0, part / max(max(sums[0], sums[1]), 1e-300))
             if phase == 0:
                 left = (gap + length * (sums[2] + length * sums[3])) / gap
-                target = max(min(max(left, 0.0) ** 3, 0.8), 1e-4) * mu
+                target = max(min(max(left, 0.0) ** 3, 0.8), centring) * mu
         before_gap = gap
         gap = advance(sizes, e, inverse, over_caps, abc, affine, step, lam, target, length)
         for i in range(size):

@@ -16,7 +16,8 @@ is the largest a_{k+1}: greed is optimal, as with more speed everywhere no time 
 import numpy as np
 from numba import njit
 
-from .lanes import LANES
+from .lanes import LANES, load, plus, scaled, store
+from .lanes import step as fused
 from .path_rows import PULL, highest, own_limit, padded, rows_of, walk
 
 #: sdot² is never more than this times what velocity or acceleration limits allow where the path is at its steepest:
@@ -44,28 +45,40 @@ def interval_derivatives(breaks, coefficients, grid, fractions, out):  # type: i
     """
     orders, points, count, dims = out.shape
     size, pieces = coefficients.shape[:2]
-    i = 0
-    for k in range(count):
-        left, step = grid[k], grid[k + 1] - grid[k]
-        middle = left + 0.5 * step
-        while i < pieces - 1 and middle >= breaks[i + 1]:
-            i += 1
-        rate = 1.0 / (breaks[i + 1] - breaks[i])
-        for p in range(points):
+    c, to = coefficients.reshape(-1), out.reshape(-1)
+    row, plane = pieces * dims, points * count * dims
+    width = (dims + LANES - 1) // LANES * LANES
+    eights = size == 4 and 2 * dims > LANES and row >= width
+    for p in range(points):
+        i = 0
+        for k in range(count):
+            left, step = grid[k], grid[k + 1] - grid[k]
+            middle = left + 0.5 * step
+            while i < pieces - 1 and middle >= breaks[i + 1]:
+                i += 1
+            rate = 1.0 / (breaks[i + 1] - breaks[i])
             x = (left + fractions[p] * step - breaks[i]) * rate
             x = 0.0 if x < 0.0 else 1.0 if x > 1.0 else x
+            if eights and k * dims + width <= count * dims:  # the next interval overwrites what is too much
+                for d in range(0, dims, LANES):
+                    at, own = (p * count + k) * dims + d, i * dims + d
+                    c3, c2 = load(c, own), load(c, own + row)
+                    third = scaled(c3, 3.0)
+                    p2 = fused(third, x, c2)
+                    store(to, at, scaled(fused(plus(p2, c2), x, load(c, own + 2 * row)), rate))
+                    if orders > 1:
+                        store(to, at + plane, scaled(p2, 2.0 * rate * rate))
+                    if orders > 2:
+                        store(to, at + 2 * plane, scaled(third, 2.0 * rate * rate * rate))
+                continue
             for d in range(dims):
-                if size == 4:
-                    c3, c2, c1 = (coefficients[0, i, d], coefficients[1, i, d], coefficients[2, i, d])
-                    p1, p2, p3 = ((3.0 * c3 * x + 2.0 * c2) * x + c1, 3.0 * c3 * x + c2, c3)
-                else:
-                    p0 = coefficients[0, i, d]
-                    p1 = p2 = p3 = 0.0
-                    for r in range(1, size):
-                        p3 = p3 * x + p2
-                        p2 = p2 * x + p1
-                        p1 = p1 * x + p0
-                        p0 = p0 * x + coefficients[r, i, d]
+                p0 = coefficients[0, i, d]
+                p1 = p2 = p3 = 0.0
+                for r in range(1, size):
+                    p3 = p3 * x + p2
+                    p2 = p2 * x + p1
+                    p1 = p1 * x + p0
+                    p0 = p0 * x + coefficients[r, i, d]
                 out[0, p, k, d] = p1 * rate
                 if orders > 1:
                     out[1, p, k, d] = 2.0 * p2 * rate * rate

@@ -1,34 +1,79 @@
-"""The Euclidean norm of polynomial vectors at many places: what the length of a path is integrated from."""
+"""The Euclidean norm of a polynomial vector's slope under two quadrature rules: what a length is integrated from."""
 
 import numpy as np
 from numba import njit
 
+from .extrema import EPS
+from .lanes import LANES, larger, load, plus, product, scaled, smaller, step, store
+
 
 @njit(cache=True, error_model="numpy")
-def speeds(coefficients, piece, u, out):  # type: ignore[no-untyped-def]
-    """Write the norms at the places.
+def speeds(coefficients, piece, left, width, nodes, weights, out):  # type: ignore[no-untyped-def]
+    """Write what the two rules find on intervals of pieces.
 
     Parameters
     ----------
-    coefficients : array (n + 1, K, D)
+    coefficients : array (n + 1, K, D), n >= 1
         Highest power first, in the local variable u.
     piece : array (I,) of int64
-    u : array (I, M)
-    out : array (I, M)
-        Overwritten.
+    left, width : array (I,)
+        The intervals of u.
+    nodes : array (32,)
+        In [0, 1]: 8 of the coarse rule, 16 of the fine one, which also looks at both ends, and these: 0, then ones.
+    weights : array (24,)
+        Of the two rules.
+    out : array (6, I)
+        Overwritten: the means by both rules; the smallest value, the smaller one at an end, and the largest, of those
+        that the fine rule looks at; and the rounding of a value.
     """
     size, _, dims = coefficients.shape
-    own = np.empty((dims, size))
-    for k in range(len(piece)):
-        i = piece[k]
+    u, values, room = np.zeros(4 * LANES), np.zeros(4 * LANES), np.zeros(4 * LANES)
+    powers = np.zeros(size * 4 * LANES)  # factors of the coefficients: k u^(k - 1) at every node
+    begin, extent = -1.0, -1.0
+    for q in range(len(piece)):
+        i = piece[q]
+        if left[q] != begin or width[q] != extent:
+            begin, extent = left[q], width[q]
+            for m in range(4 * LANES):
+                u[m] = begin + extent * nodes[m]
+                power = 1.0
+                for k in range(1, size):
+                    powers[(k * 4) * LANES + m] = k * power
+                    power *= u[m]
+        x0 = scaled(load(u, 0), 0.0)
+        t0 = t1 = t2 = t3 = x0
+        noise = 0.0
         for d in range(dims):
-            for p in range(size):
-                own[d, p] = coefficients[p, i, d]
-        for m in range(u.shape[1]):
-            at, total = u[k, m], 0.0
-            for d in range(dims):
-                value = own[d, 0]
-                for p in range(1, size):
-                    value = value * at + own[d, p]
-                total += value * value
-            out[k, m] = np.sqrt(total)
+            c = coefficients[size - 2, i, d]
+            v0 = v1 = v2 = v3 = scaled(load(powers, 4 * LANES), c)
+            rounding = abs(c)
+            for k in range(2, size):
+                c = coefficients[size - 1 - k, i, d]
+                rounding += k * abs(c)
+                v0 = step(load(powers, (4 * k) * LANES), c, v0)
+                v1 = step(load(powers, (4 * k + 1) * LANES), c, v1)
+                v2 = step(load(powers, (4 * k + 2) * LANES), c, v2)
+                v3 = step(load(powers, (4 * k + 3) * LANES), c, v3)
+            t0, t1 = plus(product(v0, v0), t0), plus(product(v1, v1), t1)
+            t2, t3 = plus(product(v2, v2), t2), plus(product(v3, v3), t3)
+            noise += rounding * rounding
+        store(values, 0, t0)
+        store(values, LANES, t1)
+        store(values, 2 * LANES, t2)
+        store(values, 3 * LANES, t3)
+        for m in range(4 * LANES):
+            values[m] = np.sqrt(values[m])
+        x, y, z = load(values, LANES), load(values, 2 * LANES), load(values, 3 * LANES)
+        store(room, 0, product(load(values, 0), load(weights, 0)))
+        store(room, LANES, plus(product(x, load(weights, LANES)), product(y, load(weights, 2 * LANES))))
+        store(room, 2 * LANES, smaller(smaller(x, y), z))
+        store(room, 3 * LANES, larger(larger(x, y), z))
+        coarse = fine = 0.0
+        lowest, highest = room[2 * LANES], room[3 * LANES]
+        for m in range(LANES):
+            coarse += room[m]
+            fine += room[LANES + m]
+            lowest, highest = min(lowest, room[2 * LANES + m]), max(highest, room[3 * LANES + m])
+        out[0, q], out[1, q], out[2, q], out[4, q] = coarse, fine, lowest, highest
+        out[3, q] = min(values[3 * LANES], values[3 * LANES + 1])
+        out[5, q] = 64.0 * EPS * np.sqrt(noise)

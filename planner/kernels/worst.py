@@ -1,7 +1,8 @@
 """The worst of a trajectory: where each derivative of each joint comes closest to a limit, or furthest beyond it.
 
-A polynomial lies between the smallest and the largest of its Bernstein coefficients. Those are a few sums, made for
-eight polynomials at once; a piece whose hull stays below the worst found so far is passed over, and few are not.
+Bounds of eight polynomials at once, from sums of their coefficients, and what they are at their ends leave few pieces
+that may be the worst. Of those the smallest and the largest Bernstein coefficients are bounds that are tighter, and
+exact where they belong to an end; what then remains has its extrema found.
 """
 
 import numpy as np
@@ -14,8 +15,8 @@ from .lanes import LANES, exceeds, larger, load, plus, product, scaled, smaller,
 TIE = 1e-9
 #: A hull above the worst found so far by less than this, relatively, is not looked into: that is rounding.
 SLACK = 1e-13
-#: The ends of so many pieces, spread over all, are looked at beforehand: few pieces then stand out at their turn.
-PROBES = 32
+#: Room below the largest number, and below zero.
+LARGEST, TINY = 1.79e308, 1e-300
 #: So many polynomials, roughly, are looked over at a time.
 BLOCK = 128
 
@@ -38,70 +39,108 @@ def _weights(n, orders):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _hull(c, at, row, degree, plain, own, room):  # type: ignore[no-untyped-def]
-    """Return the smallest and the largest Bernstein coefficient of eight polynomials, and the size of their sums.
+    """Write bounds of eight polynomials to ``room``: the largest and the smallest Bernstein coefficient, and both ends.
 
-    The coefficient of u^k is c[at - k * row] * plain[k].
+    The coefficient of u^k is c[at - k * row] * plain[k]. The bounds allow for rounding, here and in ``extrema``.
     """
     x = load(c, at)
-    low = high = x = scaled(x, plain[0])
-    store(room, 0, x)
+    low = high = first = x = scaled(x, plain[0])
+    work = 4 * LANES
+    store(room, work, x)
     size = larger(x, scaled(x, -1.0))
     for k in range(1, degree + 1):
         x = load(c, at - k * row)
-        store(room, k * LANES, scaled(x, own[k]))
+        store(room, work + k * LANES, scaled(x, own[k]))
         x = scaled(x, plain[k])
         size = plus(size, larger(x, scaled(x, -1.0)))
     for r in range(1, degree + 1):
-        left = load(room, (r - 1) * LANES)
+        left = load(room, work + (r - 1) * LANES)
         for j in range(r, degree + 1):
-            x = plus(load(room, j * LANES), left)
-            left = load(room, j * LANES)
-            store(room, j * LANES, x)
-        x = load(room, r * LANES)  # by now complete
+            x = plus(load(room, work + j * LANES), left)
+            left = load(room, work + j * LANES)
+            store(room, work + j * LANES, x)
+        x = load(room, work + r * LANES)  # by now complete
         low, high = smaller(x, low), larger(x, high)
-    return low, high, size
+    margin = 4.0 * (degree + 2) * EPS
+    store(room, 0, step(size, margin, high))
+    store(room, LANES, step(size, -margin, low))
+    # x is the last coefficient, and with the first one the only values of the polynomial among them
+    store(room, 2 * LANES, step(size, margin, larger(first, x)))
+    store(room, 3 * LANES, step(size, -margin, smaller(first, x)))
 
 
 @njit(cache=True, error_model="numpy")
-def _screen(  # type: ignore[no-untyped-def]
-    c, start, row, begin, end, degree, weights, room, order, rates, gains, limits, reach
-):
-    """Return the first of ``begin``, ``begin + LANES``, … from which on one of the next eight polynomials stands out.
+def _bounds(c, start, row, end, degree, plain, order, rates, sides, reach, to, best):  # type: ignore[no-untyped-def]
+    """Write how bad polynomials can be, at most, on either side, and raise ``best`` to how bad their ends are.
 
-    The coefficient of u^k of polynomial f is c[start + f - k * row] * weights[0][k] * rates[f] ** order; f stands out
-    where gains[0, f] times its upper bound exceeds limits[0, f] or gains[1, f] times its lower bound limits[1, f].
-    These products are left in ``reach``. The bounds allow for rounding, here and in ``extrema``.
+    p(u) lies between c_0 plus the sum of the negative and of the positive further coefficients. The coefficient of u^k
+    of polynomial f is c[start + f - k * row] * plain[k] * rates[f] ** order. The bounds allow for rounding.
     """
-    plain, own = weights
-    high_gain, low_gain, high_limit, low_limit = gains[0], gains[1], limits[0], limits[1]
     margin = 4.0 * (degree + 2) * EPS
-    for f in range(begin, end, LANES):
-        if degree == 4:
-            low, high, size = _hull(c, start + f, row, 4, plain, own, room)
-        elif degree == 3:
-            low, high, size = _hull(c, start + f, row, 3, plain, own, room)
-        elif degree == 2:
-            low, high, size = _hull(c, start + f, row, 2, plain, own, room)
-        else:
-            low, high, size = _hull(c, start + f, row, degree, plain, own, room)
-        high, low = step(size, margin, high), step(size, -margin, low)
+    high_gain, high_shift, low_gain, low_shift = sides[0], sides[1], sides[2], sides[3]
+    high_reach, low_reach = reach[0], reach[1]
+    for f in range(0, end, LANES):
+        at = start + f
+        first = scaled(load(c, at), plain[0])
+        size = rest = scaled(first, 0.0)
+        for k in range(1, degree + 1):
+            at -= row
+            x = scaled(load(c, at), plain[k])
+            rest = plus(rest, x)
+            size = plus(size, larger(x, scaled(x, -1.0)))
+        last = plus(first, rest)
+        middle = step(rest, 0.5, first)
+        size = plus(scaled(size, 0.5 + margin), scaled(larger(first, scaled(first, -1.0)), margin))
+        high, low = plus(middle, size), plus(middle, scaled(size, -1.0))
+        most, least = larger(first, last), smaller(first, last)
+        scale = load(rates, f)
         for _ in range(order):
-            high, low = product(high, load(rates, f)), product(low, load(rates, f))
-        high, low = product(high, load(high_gain, f)), product(low, load(low_gain, f))
-        if exceeds(high, load(high_limit, f)) or exceeds(low, load(low_limit, f)):
-            store(reach, 0, high)
-            store(reach, LANES, low)
+            high, low, most, least = (
+                product(high, scale),
+                product(low, scale),
+                product(most, scale),
+                product(least, scale),
+            )
+        gain, shift = load(high_gain, f), load(high_shift, f)
+        store(high_reach, to + f, plus(product(high, gain), shift))
+        bad = plus(product(most, gain), shift)
+        gain, shift = load(low_gain, f), load(low_shift, f)
+        store(low_reach, to + f, plus(product(low, gain), shift))
+        bad = larger(plus(product(least, gain), shift), bad)
+        store(best, f, larger(bad, load(best, f)))
+
+
+@njit(cache=True, error_model="numpy")
+def _next(high, low, begin, end, limits, turn):  # type: ignore[no-untyped-def]
+    """Return the first of ``begin``, ``begin + LANES``, … from which on one of eight exceeds its limit, or ``end``.
+
+    Limits come again after ``len(limits)``; those of ``begin`` start at ``turn``.
+    """
+    for f in range(begin, end, LANES):
+        above = load(limits, turn)
+        if exceeds(load(high, f), above) or exceeds(load(low, f), above):
             return f
+        turn += LANES
+        if turn == len(limits):
+            turn = 0
     return end
 
 
 @njit(cache=True, error_model="numpy")
-def _limit(most, shift, known):  # type: ignore[no-untyped-def]
-    """Return the gain times value above which a badness may be worse than ``most``."""
-    if shift == -np.inf:
-        return np.inf
-    slack = SLACK * (abs(most - shift) + abs(shift))
-    return most - shift + (slack if known else -slack)
+def _limit(most):  # type: ignore[no-untyped-def]
+    """Return the badness above which a bound says that a place may be worse than ``most``."""
+    return most + SLACK * abs(most) if abs(most) < np.inf else most
+
+
+@njit(cache=True, error_model="numpy")
+def _at_ends(coefficients, i, d, degree, plain):  # type: ignore[no-untyped-def]
+    """Return (low, at_low, high, at_high) of a derivative whose extremes are at the ends of the piece."""
+    left, right = coefficients[degree, i, d] * plain[0], 0.0
+    for k in range(degree + 1):
+        right += coefficients[k, i, d] * plain[degree - k]
+    low, at_low = (left, 0.0) if left <= right else (right, 1.0)
+    high, at_high = (left, 0.0) if left >= right else (right, 1.0)
+    return low, at_low, high, at_high
 
 
 @njit(cache=True, error_model="numpy")
@@ -114,6 +153,15 @@ def _exact(coefficients, i, d, m, own, table, points, values, found):  # type: i
         for k in range(size):
             own[6 - size + k] = coefficients[k, i, d]
         return quintic(own[0], own[1], own[2], own[3], own[4], own[5], m)[m]
+    if size - m <= 6:  # the derivative itself is a quintic at most
+        own[:] = 0.0
+        for k in range(size - m):
+            x = coefficients[k, i, d]
+            for j in range(m):
+                x *= size - 1 - k - j
+            own[6 - size + m + k] = x
+        lowest = min(m, 0)  # no literal, for which Numba would compile it once more
+        return quintic(own[0], own[1], own[2], own[3], own[4], own[5], lowest)[0]
     for k in range(size):
         table[0, k] = coefficients[k, i, d]
     chain(table, m, points, values, found)
@@ -163,29 +211,15 @@ def worst(coefficients, rate, row, gain, shift):  # type: ignore[no-untyped-def]
     plain, own = _weights(n, orders)
     held = LANES * max(BLOCK // (LANES * dims), 1)  # pieces in a block; that is a whole number of eights
     width = held * dims
-    room, reach, rates, pad = np.zeros(size * LANES), np.zeros(2 * LANES), np.zeros(width), np.zeros(size * width)
-    gains, limits = np.zeros((orders, 2, width)), np.zeros((orders, 2, width))
+    padded = (pieces + held - 1) // held * width
+    room, rates, pad = np.zeros((size + 4) * LANES), np.zeros(width), np.zeros(size * width)
+    reach, best = np.empty((orders, 2, padded)), np.zeros((orders, width))
+    best[:] = -np.inf
+    sides = np.zeros((orders, 4, width))  # gain and shift of what is too high, and of what is too low
     held_rows = np.full(held, -1)
     c = coefficients.reshape(-1)
     scalars, table = np.zeros(6), np.zeros((size + 1, size))
     points, values, found = np.zeros(size + 2), np.zeros(size + 2), np.zeros((orders, 4))
-
-    probes = min(PROBES, pieces // 16)
-    for probe in range(probes):
-        i = probe * pieces // probes
-        for m in range(orders):
-            for d in range(dims):
-                left = right = 0.0
-                for k in range(n - m, -1, -1):
-                    left = coefficients[n - m - k, i, d] * plain[m, k]
-                    right += left
-                for k in range(2 if counts[m] else 0):
-                    g, s = gain[k, m, row[i], d] * rate[i] ** m, shift[k, m, row[i], d]
-                    bad = max(g * left, g * right) + s
-                    # a little less, that the place itself, and an equal one before it, are still found
-                    bad -= 2.0 * TIE * abs(bad) + SLACK * (abs(bad - s) + abs(s))
-                    if bad > most[m, d]:  # and a number
-                        most[m, d] = bad
 
     for begin in range(0, pieces, held):
         count = min(held, pieces - begin)
@@ -203,42 +237,68 @@ def worst(coefficients, rate, row, gain, shift):  # type: ignore[no-untyped-def]
                 for m in range(orders):
                     for d in range(dims):
                         for k in range(2):
-                            gains[m, k, p * dims + d] = gain[k, m, s, d]
-                            limits[m, k, p * dims + d] = _limit(most[m, d], shift[k, m, s, d], badness[m, d] > -np.inf)
+                            sides[m, 2 * k, p * dims + d] = gain[k, m, s, d]
+                            sides[m, 2 * k + 1, p * dims + d] = shift[k, m, s, d] - SLACK * abs(shift[k, m, s, d])
+        for p in range(count, held):  # what fills up the last block counts for nothing
+            for m in range(orders):
+                for f in range(p * dims, (p + 1) * dims):
+                    sides[m, 0, f] = sides[m, 2, f] = 0.0
+                    sides[m, 1, f] = sides[m, 3, f] = -np.inf
         for m in range(orders):
-            if not counts[m]:
-                continue
-            f = min(count, 0)  # no literal, for which Numba would compile the screening once more
-            degree = n - m
-            reach[:] = 0.0
-            while f < count * dims:
-                if degree >= 0:
-                    where = start + degree * stride
-                    end, weights = count * dims, (plain[m], own[m])
-                    f = _screen(
-                        source, where, stride, f, end, degree, weights, room, m, rates, gains[m], limits[m], reach
-                    )
-                eight = f
-                for f in range(eight, min(eight + LANES, count * dims)):
-                    r = f - eight
-                    if reach[r] <= limits[m, 0, f] and reach[r + LANES] <= limits[m, 1, f]:
-                        continue
-                    i, d = begin + f // dims, f % dims
+            degree = max(n - m, 0)
+            where, end = start + degree * stride, count * dims if counts[m] else 0
+            _bounds(source, where, stride, end, degree, plain[m], m, rates, sides[m], reach[m], begin * dims, best[m])
+
+    limits = best  # from here on: above which badness a side may be worse than the worst found so far
+    for m in range(orders):
+        if not counts[m]:
+            continue
+        for d in range(dims):
+            for p in range(held):
+                most[m, d] = max(most[m, d], best[m, p * dims + d])
+            if most[m, d] > -np.inf:
+                # a little less, that the place itself, and an equal one before it, are still found
+                most[m, d] = min(most[m, d], LARGEST) - 2.0 * TIE * abs(most[m, d]) - TINY
+            for p in range(held):
+                limits[m, p * dims + d] = _limit(most[m, d])
+        degree = max(n - m, 0)
+        eight = min(m, 0)  # no literal, as above
+        while True:
+            eight = _next(reach[m, 0], reach[m, 1], eight, total, limits[m], eight % width)
+            if eight >= total:
+                break
+            if eight + LANES <= total:
+                _hull(c, eight + degree * total, total, degree, plain[m], own[m], room)
+            else:
+                for k in range(degree + 1):
+                    for f in range(eight, total):
+                        pad[(degree - k) * LANES + f - eight] = c[(degree - k) * total + f]
+                _hull(pad, degree * LANES, LANES, degree, plain[m], own[m], room)
+            for f in range(eight, min(eight + LANES, total)):
+                r, i, d = f - eight, f // dims, f % dims
+                s, scale, limit = row[i], rate[i] ** m, limits[m, d]
+                g0, g1, s0, s1 = gain[0, m, s, d], gain[1, m, s, d], shift[0, m, s, d], shift[1, m, s, d]
+                is_high = not g0 * scale * room[r] + (s0 - SLACK * abs(s0)) <= limit
+                is_low = not g1 * scale * room[r + LANES] + (s1 - SLACK * abs(s1)) <= limit
+                if not (is_high or is_low):
+                    continue
+                if (not is_high or room[r] <= room[r + 2 * LANES]) and (
+                    not is_low or room[r + LANES] >= room[r + 3 * LANES]
+                ):
+                    low, u1, high, u0 = _at_ends(coefficients, i, d, degree, plain[m])
+                else:
                     low, u1, high, u0 = _exact(coefficients, i, d, m, scalars, table, points, values, found)
-                    s, scale = row[i], rate[i] ** m
-                    high, low = scale * high, scale * low
-                    e0, e1 = gain[0, m, s, d] * high + shift[0, m, s, d], gain[1, m, s, d] * low + shift[1, m, s, d]
-                    for turn in range(2):
-                        which = turn if u0 <= u1 else 1 - turn  # the side that comes first
-                        bad = e0 if which == 0 else e1
-                        if bad > most[m, d]:
-                            most[m, d] = bad
-                            if not (bad <= badness[m, d] + TIE * abs(bad)):
-                                badness[m, d], value[m, d] = bad, high if which == 0 else low
-                                at[m, d], piece[m, d], side[m, d] = u0 if which == 0 else u1, i, which
-                            for p in range(held):
-                                s = held_rows[p]
-                                for k in range(2 if s >= 0 else 0):
-                                    limits[m, k, p * dims + d] = _limit(bad, shift[k, m, s, d], True)
-                f = eight + LANES
+                high, low = scale * high, scale * low
+                e0, e1 = g0 * high + s0, g1 * low + s1
+                for first in range(2):
+                    which = first if u0 <= u1 else 1 - first  # the side that comes first
+                    bad = e0 if which == 0 else e1
+                    if bad > most[m, d]:
+                        most[m, d] = bad
+                        if not (bad <= badness[m, d] + TIE * abs(bad)):
+                            badness[m, d], value[m, d] = bad, high if which == 0 else low
+                            at[m, d], piece[m, d], side[m, d] = u0 if which == 0 else u1, i, which
+                        for p in range(held):
+                            limits[m, p * dims + d] = _limit(bad)
+            eight += LANES
     return badness, value, at, piece, side, most

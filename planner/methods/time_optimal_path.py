@@ -5,7 +5,7 @@ from dataclasses import replace
 from pydantic import Field
 
 from ..deadline import Deadline
-from ..errors import SolverFailed, Unsupported
+from ..errors import Infeasible, SolverFailed, Unsupported
 from ..method import Capabilities, Method, Reference
 from ..paths import PathOptions, build_path
 from ..timing.ends import path_state
@@ -43,12 +43,13 @@ def solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
     bound = duration_bound([a.course for a in moving], grids, least, request.bound, deadline)
     if wanted > answer.trajectory.duration:
         try:
-            answers, solver = lasting(courses, options.stations, wanted, deadline), "interior_point"
-        except SolverFailed as error:
+            gentle = _laws(lasting(courses, options.stations, wanted, deadline))
+            answer = follow(path, request, courses, gentle, "interior_point")
+        except (SolverFailed, Infeasible) as error:
             if any(not c.rests for c in courses):
-                reason = f"from or to a moving end the duration is not met: {error.status}"
+                reason = f"from or to a moving end the duration is not met: {error}"
                 raise Unsupported("time_optimal_path", "duration", reason=reason) from None
-        answer = follow(path, request, courses, _laws(answers), solver)
+            answer = follow(path, request, courses, _laws(answers), solver)  # the fastest, slowed
     return replace(answer, bound=bound)
 
 

@@ -18,6 +18,9 @@ Index = NDArray[np.int64]
 #: Path speed and path acceleration.
 State = tuple[float, float]
 
+#: Where pieces of the path are looked at for a standstill: a slope below this share of the mean is one.
+SHARES = (np.arange(16) + 0.5) / 16.0
+STALL = 0.1
 #: Where an interval with one piece of law, or each of two pieces, is looked at, in shares of the piece's duration.
 POINTS = {1: np.array([0.0, 0.25, 0.5, 0.75, 1.0]), 2: np.array([0.0, 0.5, 1.0])}
 
@@ -50,6 +53,14 @@ class Course:
         if self.curve.pieces == 1 or not same:
             return same
         return not counted_jumps(self.curve, 2, self.curve.extrema(3).peak(2)).any()
+
+    @cached_property
+    def stalls(self) -> bool:
+        """Whether the path nearly stands still inside, so that joints hardly tell how its parameter moves."""
+        inside = self.curve.breaks[:-1, None] + np.diff(self.curve.breaks)[:, None] * SHARES
+        slope = np.abs(self.curve.states(inside, 1, first=1)[0])
+        slope = (slope / np.minimum(self.upper[2], -self.lower[2])[:, None]).max(axis=2).reshape(-1)
+        return bool(slope[len(SHARES) : -len(SHARES)].min(initial=np.inf) < STALL * slope.mean())
 
     @property
     def rests(self) -> bool:

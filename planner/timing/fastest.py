@@ -28,6 +28,8 @@ GOAL = 5e-4, 1e-3
 MOST = 40_000, 10_000
 #: Stations to begin with: in all, and to every piece of the path.
 FIRST = 64, 8
+#: Halvings of the intervals next to rests: without jerk limits s grows as t² there, with them as t³.
+HALVINGS = 6, 12
 #: The same share where limits are not meant to be used in full: the grid is split only where they are broken.
 UNUSED = 1e3
 #: Tolerances of the interior point while the grid changes, and at last.
@@ -37,7 +39,7 @@ ROUGH, FINE = 1e-4, 1e-6
 #: A duration that is asked for is met from below by this much; the rest is a uniform slow-down.
 NEAR = 2e-4, 1.5e-3
 #: The same where the ends move, which no slow-down leaves alone.
-EXACT = -1e-8, 1e-8
+EXACT = 0.0, 2e-8
 SEARCHES = 30
 
 
@@ -126,20 +128,22 @@ def best_law(
     goal = np.inf if stations or grid is not None else UNUSED if price > 0.0 else GOAL[third]
     if grid is None:
         scale = 4 if price > 0.0 else 1
-        grid = initial_grid(course.curve, stations or scale * max(FIRST[0], FIRST[1] * course.curve.pieces))
+        count = stations or scale * max(FIRST[0], FIRST[1] * course.curve.pieces)
+        rests = course.start[0] == 0.0, course.end[0] == 0.0
+        grid = initial_grid(course.curve, count, rests, HALVINGS[third])
     most = max(MOST[third], 2 * len(grid))
     started = time.perf_counter()
     solve = partial(_third, course, price) if third else partial(_second, course)
     notes: tuple[Note, ...] = ()
     try:
         found = refined(course, grid, solve, goal, most, deadline)
-        law, grid = found.attempt.law.law, found.grid
+        law, grid, rounds = found.attempt.law.law, found.grid, found.rounds
     except SolverFailed as error:
         if not course.rests:
             raise
-        law = smooth_law(course.curve)
+        law, rounds = smooth_law(course.curve), 0
         notes = (Note("not_optimal", f"no time-optimal profile was found ({error.status}): a smooth law stands in"),)
-    return Answer(course, Timed(law, time.perf_counter() - started, notes), grid)
+    return Answer(course, Timed(law, time.perf_counter() - started, notes, rounds), grid)
 
 
 def _second(course: Course, grid: Array, tight: Array, before: Attempt | None, rough: bool) -> Attempt:

@@ -50,11 +50,12 @@ class Units:
 
 @dataclass(frozen=True, eq=False)
 class Timed:
-    """A law s(t) from rest to rest that starts at time 0, the seconds spent in the solver, and what it had to say."""
+    """A law s(t) that starts at time 0, the seconds spent in the solver, what it had to say, and its rounds."""
 
     law: Trajectory
     seconds: float
     notes: tuple[Note, ...] = ()
+    rounds: int = 1
 
 
 #: What a dwell takes of the whole motion: the path asks for one, nothing says how long.
@@ -101,10 +102,7 @@ def follow(
     """
     total = sum(t.law.duration for t in timed if t)
     dwell = max(DWELL * total, MIN_STEP)
-    laws = [
-        Trajectory.from_hermite([0.0, dwell], [[c.curve.start], [c.curve.end]]) if t is None else t.law
-        for c, t in zip(each, timed, strict=True)
-    ]
+    laws = [_still(c.curve.breaks, dwell) if t is None else t.law for c, t in zip(each, timed, strict=True)]
     notes = dict.fromkeys(note for t in timed if t for note in t.notes)
     law = in_a_row(laws)
     times = _reached(law, path.knots)
@@ -123,7 +121,7 @@ def follow(
     return Solution(
         trajectory,
         times if path.passes else None,
-        Stats(solver, "solved", law.pieces, sum(t.seconds for t in timed if t)),
+        Stats(solver, "solved", sum(t.rounds for t in timed if t), sum(t.seconds for t in timed if t)),
         Followed(path.curve, law),
         notes=tuple(notes),
     )
@@ -132,6 +130,11 @@ def follow(
 def time_each(each: Sequence[Course], time_course: TimeCourse) -> list[Timed | None]:
     """Return the laws of the courses; None for those that stand still."""
     return [time_course(course) if course.moves else None for course in each]
+
+
+def _still(breaks: Array, dwell: float) -> Trajectory:
+    """Return the law that passes the breaks of a path that stands still, in the time of a dwell."""
+    return Trajectory.from_hermite(dwell * (breaks - breaks[0]) / (breaks[-1] - breaks[0]), breaks[:, None])
 
 
 def _corners(curve: Trajectory, order: int) -> Array:

@@ -12,14 +12,16 @@ Array = NDArray[np.float64]
 GRADED = 6
 
 
-def initial_grid(stretch: Trajectory, stations: int) -> Array:
-    """Return about ``stations`` stations, the path's breaks among them, halved repeatedly towards both ends."""
+def initial_grid(
+    stretch: Trajectory, stations: int, rests: tuple[bool, bool] = (True, True), halvings: int = GRADED
+) -> Array:
+    """Return about ``stations`` stations, the path's breaks among them, halved repeatedly towards ends at rest."""
     each = max(int(np.ceil(stations / stretch.pieces)), 4)
     inner = stretch.breaks[:-1, None] + np.diff(stretch.breaks)[:, None] * np.arange(each) / each
     grid = np.append(inner.reshape(-1), stretch.end)
-    first = grid[0] + (grid[1] - grid[0]) * 0.5 ** np.arange(GRADED, 0, -1)
-    last = grid[-1] - (grid[-1] - grid[-2]) * 0.5 ** np.arange(1, GRADED + 1)
-    return np.unique(np.concatenate([grid, first, last]))
+    first = grid[0] + (grid[1] - grid[0]) * 0.5 ** np.arange(halvings, 0, -1)
+    last = grid[-1] - (grid[-1] - grid[-2]) * 0.5 ** np.arange(1, halvings + 1)
+    return np.unique(np.concatenate([grid, *([first] if rests[0] else []), *([last] if rests[1] else [])]))
 
 
 def refined(grid: Array, where: NDArray[np.bool_]) -> Array:

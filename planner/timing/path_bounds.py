@@ -41,7 +41,8 @@ class LeastDuration:
             ends = course.start[0] ** 2, course.end[0] ** 2
             seconds = np.empty(len(piece))
             total += least_duration(curve.breaks, curve.coefficients, grid, *limits, course.norm[piece], *ends, seconds)
-        return max(float(total), self.floor)
+        rests = all(course.rests for course in self.courses)  # else limits and durations are kept to 1e-8 only
+        return max(float(total), self.floor) * (1.0 if rests else 1.0 - 3e-8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,7 @@ class Relaxation:
 
     def lower_bound(self) -> float:
         """Return the sum over the courses, s."""
-        return max(sum(dual_value(s) for s in self.splines), self.floor)
+        return float(max(sum(dual_value(s) for s in self.splines), self.floor))
 
 
 def dual_value(spline: third_order.Spline) -> float:
@@ -84,7 +85,7 @@ def dual_value(spline: third_order.Spline) -> float:
     gradient = np.zeros(m + 2)
     for i in range(3):
         gradient[i : m + i] += each[i]
-    for (share, seconds, cap), at, single in zip(p.ends, (1, m), spline.multipliers[1][:2], strict=True):
+    for (share, seconds, cap, _), at, single in zip(p.ends, (1, m), spline.multipliers[1][:2], strict=True):
         if share > 0:
             time = seconds / np.sqrt(share * y[at])
             value += time - single * (1.0 - share * y[at] / cap)

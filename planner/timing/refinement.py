@@ -34,6 +34,8 @@ LEAST = 0.1
 SLOW = 1e-4
 #: With moving ends nothing is slowed at the end: limits must be kept to this.
 EXACT = 1e-8
+#: Where all limits of a kind are lowered alike at last.
+ALIKE = 1e-3
 #: No more is split where it would add fewer stations than this share of them.
 WORTH = 0.1
 SPLITTINGS = 7
@@ -62,11 +64,12 @@ Solve = Callable[[Array, Array, Attempt | None, bool], Attempt]
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """The best attempt, its grid, and what is lost on the grid, in s."""
+    """The best attempt, its grid, what is lost on the grid, in s, and the rounds that it took."""
 
     attempt: Attempt
     grid: Array
     loss: float
+    rounds: int
 
 
 def refined(course: Course, grid: Array, solve: Solve, goal: float, most: int, deadline: Deadline) -> Refined:
@@ -101,14 +104,16 @@ def refined(course: Course, grid: Array, solve: Solve, goal: float, most: int, d
         over = float(factors.max()) - 1.0
         score = law.duration * max(1.0 + over, 1.0)
         if score < best:
-            best, best_found = score, Refined(attempt, grid, float(loss.sum()))
+            best, best_found = score, Refined(attempt, grid, float(loss.sum()), turn + 1)
         refines = splittings < SPLITTINGS and goal < np.inf
         coarse = goal < np.inf and over > COARSE and turn < ROUNDS - SETTLING
         parts = _parts(grid, loss if refines else np.zeros_like(loss), factors, goal * law.duration, most)
         splits = refines and parts.sum() > (1.0 + WORTH) * len(parts) or coarse and parts.sum() > len(parts)
         if over <= (SLOW if course.rests else EXACT) and not splits:
-            return Refined(attempt, grid, float(loss.sum()))
+            return Refined(attempt, grid, float(loss.sum()), turn + 1)
         lowered = _lowered(tight, found, attempt.share, 1.0 - 0.3 * (SLOW if course.rests else EXACT))
+        if not course.rests and not splits and over <= ALIKE:
+            lowered = _lowered_alike(tight, found)
         if splits:
             splittings += 1
             owner, grid = _split(grid, parts)
@@ -126,6 +131,12 @@ def _lowered(tight: Array, found: Use, share: Array | None, target: float) -> Ar
     used = tight if share is None else np.minimum(share, tight)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(most > 1.0, np.maximum(used * (target / most), LEAST), tight)
+
+
+def _lowered_alike(tight: Array, found: Use) -> Array:
+    """Return shares lowered everywhere by what is too much somewhere, which is little."""
+    most = found.most.max(axis=(1, 2), keepdims=True)
+    return np.where(most > 1.0, tight * ((1.0 - EXACT) / np.maximum(most, 1.0)), tight)
 
 
 def _parts(grid: Array, loss: Array, factors: Array, goal: float, most: int) -> NDArray[np.int64]:

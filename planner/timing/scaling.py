@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ..corridors import highest_speeds
 from ..errors import Infeasible
-from ..jumps import counted_jumps
-from ..limits import QUANTITIES, DurationBounds, Limits, magnitude, norm_bounds, segment_bounds
+from ..jumps import Jumps
+from ..limits import QUANTITIES, DurationBounds, Limit, Limits, magnitude, norm_bounds, segment_bounds
 from ..trajectory import Trajectory
 from ..types import PlanRequest
 from ..worst import measures, peaks, worst
@@ -40,18 +40,27 @@ def slowdown(trajectory: Trajectory, request: PlanRequest, waypoint_times: Array
     trajectory = trajectory.split(waypoint_times)
     middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
     segment = np.clip(np.searchsorted(waypoint_times, middles, side="right") - 1, 0, request.count - 2)
-    each = [
-        segment_bounds(request.limits, request.segment_limits, m, request.count - 1, request.dims) for m in range(4)
-    ]
-    ratios = worst(trajectory, *measures(np.stack([x.lower for x in each]), np.stack([x.upper for x in each])), segment)
-    highest = peaks(trajectory, 3)
+    if request.segment_limits is None:
+        segment = np.zeros_like(segment)
+        bounds = (request.limits.bounds(m, request.dims) for m in range(4))
+        each = [Limit(x.lower[None], x.upper[None]) for x in bounds]
+    else:
+        segments = request.count - 1
+        each = [segment_bounds(request.limits, request.segment_limits, m, segments, request.dims) for m in range(4)]
+    ratios = worst(trajectory, *measures(np.array([x.lower for x in each]), np.array([x.upper for x in each])), segment)
+    bounded = np.array([(np.isfinite(x.lower) | np.isfinite(x.upper)).any(axis=0) for x in each])  # (4, D)
+    judge, highest = Jumps(trajectory), None
     best, jumping = Slowdown(0.0, None), np.zeros(trajectory.dims, dtype=bool)
     for order in (1, 2, 3):
         lower_order, limit = order - 1, each[order]
-        jumping = jumping | counted_jumps(trajectory, lower_order, highest[lower_order]).any(axis=0)
-        bounded = (np.isfinite(limit.lower) | np.isfinite(limit.upper)).any(axis=0)
-        if (jumping & bounded).any():
-            joint = int(np.argmax(jumping & bounded))
+        if bounded[order:].any():  # the larger the peak, the less is a jump; most often none is near
+            counted, _ = judge.judged(lower_order, np.abs(judge.ends(lower_order)).max(axis=(0, 1)))
+            if counted.any():
+                highest = peaks(trajectory, 3) if highest is None else highest
+                counted, _ = judge.judged(lower_order, highest[lower_order])
+            jumping = jumping | counted.any(axis=0)
+        if (jumping & bounded[order]).any():
+            joint = int(np.argmax(jumping & bounded[order]))
             raise Infeasible(
                 f"the path's derivative of order {lower_order} jumps in joint {joint}, so its {QUANTITIES[order]} is "
                 "unbounded at any speed: choose a smoother path, or a method that stops there",

@@ -45,6 +45,7 @@ def _passes(course: Course, grid: Array, tight: Array, relaxed: float) -> tuple[
     scale = tight[1] * relaxed
     lower, upper = course.lower[1][piece] * scale, course.upper[1][piece] * scale
     first, last = course.start[0] ** 2, course.end[0] ** 2
+    caps[0], caps[-1] = max(caps[0], first), max(caps[-1], last)  # what is asked there keeps the limits themselves
     status, where = fastest_speeds(np.diff(grid), slopes, bends, caps, lower, upper, first, last, best, least, a)
     if status == 0 and not np.isfinite(a).all():
         raise OverflowError("the path speeds leave the range of floating point")
@@ -88,7 +89,7 @@ def _explain(course: Course, grid: Array, tight: Array, status: int, where: int,
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _passes(course, grid, tight, middle)[0] else (low, middle)
-    start = status >= 2
+    start = status == 2  # otherwise no speed, or only a higher one, leads to the end
     speed, at = (course.start[0], 0) if start else (course.end[0], len(grid) - 1)
     slope = course.curve(grid[at], 1)
     k = min(max(where - 1 if where == len(grid) - 1 else where, 0), len(grid) - 2)

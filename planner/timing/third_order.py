@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverFailed
+from ..errors import Infeasible, SolverFailed
 from ..kernels.lanes import LANES
 from .course import Course, LawPieces, use
 from .second_order import derivatives
@@ -27,8 +27,22 @@ CAP = 4.0
 #: Complementarity to begin with, as a share of the duration.
 START = 0.1
 ITERATIONS = 150
+#: Least share of the complementarity that an iteration aims at.
+CENTRING = 1e-4
+#: How a gentle profile within limits that are still too large is approached: start, centring, tolerance, iterations.
+GENTLE = 2.0, 1.0, 0.0, 8
+#: It is to take about so many times as long as the fastest one without jerk limits.
+SLOWER = 2.0
 #: Rounds in which limits that a first guess breaks are lowered to what they are.
 LOWERINGS = 60
+#: So many intervals are near a moving end.
+NEAR = 8
+#: No progress in that.
+STUCK = 0.05
+#: A moving end may be at its velocity limit: inside of that there is room of this, relative to squared speed.
+AT_LIMIT = 8e-9
+#: Limits are lowered to a little more than what a profile needs; one that needs less than ``TOUCHING`` is inside.
+WIDER, TOUCHING = (1e-7, 0.05), 1.0 - 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +50,15 @@ class End:
     """How a profile leaves the first station (or, mirrored, reaches the last).
 
     ``rest``: the interval next to it is run through as the module says, and the spline begins at its other station;
-    there b = ``slope`` a, and the interval takes ``seconds`` / sqrt(a). Otherwise the spline begins at the station
-    itself. ``fixed``: a and b where the spline begins, if they are given.
+    there b = ``slope`` a, and the interval takes ``seconds`` / sqrt(a); ``jerky``: at constant path jerk. Otherwise the
+    spline begins at the station itself. ``fixed``: a and b where the spline begins, if they are given.
     """
 
     rest: bool
     slope: float
     seconds: float
     fixed: tuple[float, float] | None
+    jerky: bool = False
 
     @classmethod
     def of(cls, state: tuple[float, float], step: float, jerk: bool) -> "End":
@@ -53,7 +68,9 @@ class End:
             return cls(False, 0.0, 0.0, (speed * speed, push))
         if push > 0.0:
             return cls(True, 0.5 / step, 2.0 * step, (2.0 * push * step, push))
-        return cls(True, 2.0 / (3.0 * step), 3.0 * step, None) if jerk else cls(True, 0.5 / step, 2.0 * step, None)
+        if jerk:
+            return cls(True, 2.0 / (3.0 * step), 3.0 * step, None, True)
+        return cls(True, 0.5 / step, 2.0 * step, None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,29 +148,44 @@ def pose(course: Course, grid: Array, tight: Array, ceiling: Array) -> Problem:
     bounds = [(upper[1], lower[1])] * len(sides)
     if course.jerk:
         forms.append((q3[1], 3.0 * q2[1], q1[1]))
-        bounds.append((upper[2], lower[2]))
+        for p, x in ((0, -h), (2, h)) if course.stalls else ():
+            jolt = q1[p] + 1.5 * x * q2[p] + x * x / 6.0 * q3[p]
+            forms.append((q3[p], 3.0 * q2[p] + x * q3[p], jolt))
+        bounds += [(upper[2], lower[2])] * (len(forms) - len(sides))
     width = -(-count // LANES) * LANES
-    rows = len(forms) * dims
+    rows, pushes = len(forms) * dims + 1, len(sides) * dims + 1
     e, inverse = np.zeros((rows, 3, width)), np.zeros((rows, 2, width))
     for i, (form, bound) in enumerate(zip(forms, bounds, strict=True)):
-        at = slice(i * dims, (i + 1) * dims)
+        at = slice(i * dims + 1, (i + 1) * dims + 1)
         e[at, :, :count] = np.stack(form).transpose(2, 0, 1)
         inverse[at, :, :count] = 1.0 / np.stack(bound).transpose(2, 0, 1)
-    slope = q1[1]
-    with np.errstate(divide="ignore", over="ignore"):
-        speed = np.where(slope > 0, upper[0], -lower[0]) / np.abs(slope)
-        norm = course.norm[piece] * tight[3, inner, 0] / np.linalg.norm(slope, axis=1)
-        caps = np.minimum(speed.min(axis=1), norm) ** 2
-    lid = np.maximum(ceiling[:-1], ceiling[1:])[inner]
-    caps = np.minimum(caps, CAP * lid)
-    ends = np.zeros((2, 3))
+    lid = CAP * np.maximum(ceiling[:-1], ceiling[1:])[inner]
+    norm = course.norm[piece] * tight[3, inner, 0]
+    caps, late = (np.minimum(_caps(q1[p], upper[0], lower[0], norm), lid) for p in (1, 2))
+    for end, near in ((first, slice(0, NEAR)), (last, slice(-NEAR, None))):
+        if end.fixed is not None:  # nothing is lowered below the speed asked there
+            share = (1.0 / tight[[0, 3], inner][:, near].min(axis=(0, 2))) ** 2
+            for each in (caps, late):
+                each[near] = np.maximum(each[near], np.minimum(share * each[near], end.fixed[0]))
+    room = 1.0 if course.rests else 1.0 + AT_LIMIT
+    e[0, :, :count] = np.stack([np.ones(count), h[:, 0], h[:, 0] ** 2 / 6.0])  # the first row: a at the right end
+    inverse[0, 0, :count] = 1.0 / (late * room)
+    over_caps = np.zeros(width)
+    over_caps[:count] = 1.0 / (caps * room)
+    ends = np.zeros((2, 4))
     for i, (end, k) in enumerate(((first, 0), (last, len(steps) - 1))):
         if end.rest and end.fixed is None:
-            ends[i] = ratios[i], end.seconds, _end_cap(course, grid, end, k, tight)
-    over_caps = np.zeros(width)
-    over_caps[:count] = 1.0 / caps
-    sizes = len(sides) * dims, rows, width
+            effort = end.slope**2 * end.seconds / (3.0 if end.jerky else 1.0)
+            ends[i] = ratios[i], end.seconds, _end_cap(course, grid, end, k, tight), effort
+    sizes = pushes, rows, width
     return Problem(grid, first, last, maps, fixed, sizes, e.reshape(-1), inverse.reshape(-1), over_caps, ends)
+
+
+def _caps(slope: Array, upper: Array, lower: Array, norm: Array) -> Array:
+    """Return the largest a that limits of velocity and of its norm allow at given slopes (m, D)."""
+    with np.errstate(divide="ignore", over="ignore"):
+        speed = np.where(slope > 0, upper, -lower) / np.abs(slope)
+        return np.asarray(np.minimum(speed.min(axis=1), norm / np.linalg.norm(slope, axis=1)) ** 2)
 
 
 def _ratio(end: End, steps: Array, at: int) -> float:
@@ -180,7 +212,7 @@ def _end_pieces(stations: Array, a: Array, end: End, leaving: bool) -> Array:
     step = stations[1] - stations[0]
     speed = np.sqrt(max(float(a.max()), 1e-300))
     time, jerk = end.seconds / speed, 0.0
-    if end.seconds > 2.5 * step:  # constant path jerk
+    if end.jerky:
         jerk = 6.0 * step / time**3
         push = 0.0 if leaving else -jerk * time
     else:
@@ -203,8 +235,10 @@ def solve(problem: Problem, guess: Array, price: tuple[float, float], tolerance:
 
     Raises
     ------
+    Infeasible
+        No profile that keeps the limits was found (moving ends only).
     SolverFailed
-        No profile keeps the limits as far as was found (moving ends only), or the numbers run out.
+        The numbers run out.
     """
     from ..kernels.path_jerk import solve_profile
 
@@ -223,25 +257,37 @@ def solve(problem: Problem, guess: Array, price: tuple[float, float], tolerance:
     with np.errstate(all="ignore"):
         over = _excess(p, y)
         if movable:
-            y *= INSIDE / over
-            over = INSIDE
+            y *= INSIDE / max(over[0], over[1] ** (2.0 / 3.0))
+            over = INSIDE, INSIDE
     if not np.isfinite(y).all():
         raise OverflowError("the path speeds leave the range of floating point")
-    total = 0
+    total, most = 0, np.inf
+    length, fastest = (
+        float(np.diff(p.grid).sum()),
+        float((np.diff(p.grid) / np.sqrt(0.5 * (guess[:-1] + guess[1:]))).sum()),
+    )
+    gentle = np.array([1.0, (SLOWER * fastest) ** 4 / (36.0 * length**2)])
     for _ in range(LOWERINGS):
-        relax = max(over / INSIDE, 1.0)
+        before, most = most, max(over)
+        wider = WIDER[1] if abs(most - before) < STUCK * abs(most - 1.0) else np.clip(most - 1.0, *WIDER)
+        relax = most * (1.0 + wider) if most > TOUCHING else 1.0
         inverse, over_caps, ends = p.inverse / relax, p.over_caps / relax, p.ends.copy()
         ends[:, 2] *= relax
         final = relax == 1.0
-        args = p.sizes, long_steps, p.maps, p.fixed, p.forms, inverse, over_caps, ends, prices, y, weights, single
-        count, _gap = solve_profile(*args, START, tolerance if final else 1e30, ITERATIONS if final else 3)
+        args = p.sizes, long_steps, p.maps, p.fixed, p.forms, inverse, over_caps, ends
+        how = (START, CENTRING, tolerance, ITERATIONS) if final else GENTLE
+        count, _gap = solve_profile(*args, prices if final else gentle, y, weights, single, *how)
         if count < 0 or not np.isfinite(y).all():
             raise SolverFailed("interior_point", "the profile is not strictly feasible")
         total += count
         if final:
             return _read(p, y, (weights, single), total)
         over = _excess(p, y)
-    raise SolverFailed("interior_point", "no profile within the limits was found from the given end states")
+    raise Infeasible(
+        f"no law with the velocities and accelerations asked at the ends was found within the limits; limits of jerk, "
+        f"acceleration and squared velocity {max(over):.6g} times as large would do: ask for less at the ends",
+        quantity="jerk",
+    )
 
 
 def _put_ends(p: Problem, y: Array, steps: Array) -> None:
@@ -252,17 +298,15 @@ def _put_ends(p: Problem, y: Array, steps: Array) -> None:
             y[at], y[beside] = end.fixed[0], end.fixed[0] + end.fixed[1] * step
 
 
-def _excess(p: Problem, y: Array) -> float:
-    """Return by which factor a profile would have to be divided to touch the nearest bound."""
+def _excess(p: Problem, y: Array) -> tuple[float, float]:
+    """Return the largest ratios to their limits of what grows with a profile's size, and of the jolts: with its 3/2."""
     pushes, rows, _ = p.sizes
-    m = len(p.maps)
     abc, ratios = _ratios(p, y)
-    worst = [float((abc[0] * p.over_caps[:m]).max()), float(ratios[:pushes].max())]
-    if rows > pushes:
-        worst.append(max(float((ratios[pushes:] * np.sqrt(np.maximum(abc[0], 0.0))).max()), 0.0) ** (2.0 / 3.0))
-    for (share, _, cap), at in zip(p.ends, (1, -2), strict=True):
-        worst.append(share * y[at] / cap if share > 0 else 0.0)
-    return max(worst)
+    worst = max(float((abc[0] * p.over_caps[: len(p.maps)]).max()), float(ratios[:pushes].max()))
+    for (share, _, cap, _), at in zip(p.ends, (1, -2), strict=True):
+        worst = max(worst, share * y[at] / cap if share > 0 else 0.0)
+    jolts = ratios[pushes:] * np.sqrt(np.maximum(abc[0], 0.0))
+    return worst, max(float(jolts.max(initial=0.0)), 0.0)
 
 
 def _read(p: Problem, y: Array, multipliers: tuple[Array, Array], iterations: int) -> Spline:
@@ -339,10 +383,11 @@ def shares(spline: Spline, tight: Array) -> Array:
     abc, ratios = _ratios(p, y)
     inner = slice(int(p.first.rest), tight.shape[1] - int(p.last.rest))
     share = tight.copy()
-    push = ratios[:pushes].reshape(-1, dims, m).max(axis=0)
+    push = ratios[1:pushes].reshape(-1, dims, m).max(axis=0)
     share[1, inner] *= np.maximum(push.T, 0.0)
     if rows > pushes:
-        share[2, inner] *= np.maximum((ratios[pushes:] * np.sqrt(np.maximum(abc[0], 0.0))).T, 0.0)
+        jolts = ratios[pushes:].reshape(-1, dims, m).max(axis=0) * np.sqrt(np.maximum(abc[0], 0.0))
+        share[2, inner] *= np.maximum(jolts.T, 0.0)
     return np.where(share > 0, share, tight)
 
 

@@ -119,6 +119,31 @@ def test_the_growth_is_drawn(out):
     assert "## Minimum jerk\n" in (out / "report.md").read_text(encoding="utf-8")
 
 
+@pytest.fixture(scope="module")
+def timings(out):
+    with (out / "path_timing.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_path_timing_has_its_peers_without_goals_for_small_sizes(timings, out):
+    entries = {part: {r["entry"] for r in timings if r["part"] == part} for part in {r["part"] for r in timings}}
+    assert {"fastest_speeds", "toppra compute_parameterization", "copp-py topp2_ra"} <= entries["given stations"]
+    assert {"plan, default", "plan, stations=200", "toppra"} <= entries["from waypoints to samples"]
+    assert entries["jerk limits on given stations"] == {"pose and solve", "copp-py topp3_socp", "IPOPT"}
+    assert {"from planner import plan", "first plan, with jerk"} <= entries["a new process"] and "default" in entries["quality"]
+    assert {r["goal"] for r in timings} == {""}
+    copp = [r for r in timings if r["entry"].startswith("copp-py")]
+    assert all(bool(r["ms"]) == (find_spec("copp_py") is not None) for r in copp)
+    assert "## Path timing\n" in (out / "report.md").read_text(encoding="utf-8")
+
+
+def test_our_laws_along_a_path_keep_the_limits_and_are_near_the_best(timings):
+    ours = [r for r in timings if r["part"] == "quality" or r["entry"].startswith("plan, ")]
+    assert len(ours) == 6 and max(float(r["beyond"]) for r in ours) <= 1e-6
+    assert max(float(r["over_strict"]) for r in ours if r["over_strict"]) < 1e-3
+    assert min(float(r["gap"]) for r in ours if r["gap"]) >= -1e-9
+
+
 def test_the_report_tells_the_machine_and_splits_a_request(out):
     report = (out / "report.md").read_text(encoding="utf-8")
     assert "Measured on" in report and "toppra 0." in report
