@@ -5,7 +5,7 @@ path acceleration has a price, constant path jerk (``third_order``).
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -41,15 +41,18 @@ NEAR = 2e-4, 1.5e-3
 #: The same where the ends move, which no slow-down leaves alone.
 EXACT = 0.0, 2e-8
 SEARCHES = 30
+#: Profiles whose durations differ by less than this, relatively, may be mixed.
+MIXED = 3e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A law along a course, and the grid on which it was found."""
+    """A law along a course, the grid on which it was found, and the spline profile behind it, if there is one."""
 
     course: Course
     timed: Timed
     grid: Array
+    spline: third_order.Spline | None = None
 
 
 def fastest(courses: list[Course], stations: int | None, deadline: Deadline) -> list[Answer | None]:
@@ -69,20 +72,27 @@ def lasting(courses: list[Course], stations: int | None, duration: float, deadli
     SolverFailed
         The duration was not met.
     """
-    low, high = NEAR if all(c.rests for c in courses) else EXACT
+    rests = all(c.rests for c in courses)
+    low, high = NEAR if rests else EXACT
     wanted = duration * (1.0 - 0.5 * (low + high))
     lengths = np.array([c.curve.duration for c in courses if c.moves])
     x, y = 4.0 * np.log(wanted / np.sqrt(lengths).sum()) - np.log(36.0), np.log(wanted)
     slope, known = 0.25, []
+    below: list[Answer | None] | None = None
+    above: list[Answer | None] | None = None
     grids: list[Array | None] = [None] * len(courses)
     for _ in range(SEARCHES):
         answers = [
             best_law(c, stations, float(np.exp(x)), deadline, grid) if c.moves else None
             for c, grid in zip(courses, grids, strict=True)
         ]
-        taken = sum(a.timed.law.duration for a in answers if a)
+        taken = _taken(answers)
         if duration * (1.0 - high) <= taken <= duration * (1.0 - low):
             return answers
+        if grids[0] is not None:
+            below, above = (answers, above) if taken < wanted else (below, answers)
+            if not rests and below and above and _taken(above) < _taken(below) * (1.0 + MIXED):
+                return _mixed(below, above, wanted)
         # from now on the same grids, so that the duration is smooth in the price
         grids = [None if a is None else a.grid for a in answers]
         known.append((x, float(np.log(taken))))
@@ -90,6 +100,30 @@ def lasting(courses: list[Course], stations: int | None, duration: float, deadli
             break  # a lower price hardly makes it faster
         x = _next(known, y, slope)
     raise SolverFailed("timing", "no price of path acceleration gives the duration asked for")
+
+
+def _taken(answers: list[Answer | None]) -> float:
+    return float(sum(a.timed.law.duration for a in answers if a is not None))
+
+
+def _mixed(below: list[Answer | None], above: list[Answer | None], wanted: float) -> list[Answer | None]:
+    """Return answers of a duration between those of two on the same grids: of convex sums of their profiles.
+
+    The limits of velocity and acceleration are linear in a profile, those of jerk nearly so between close ones.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        share = 0.5 * (low + high)
+        answers = [_sum(x, y, share) for x, y in zip(below, above, strict=True)]
+        low, high = (share, high) if _taken(answers) < wanted else (low, share)
+    return answers
+
+
+def _sum(x: Answer | None, y: Answer | None, share: float) -> Answer | None:
+    if x is None or y is None or x.spline is None or y.spline is None:
+        return x
+    law = third_order.law_of(third_order.mixed(x.spline, y.spline, share)).law
+    return replace(x, timed=replace(x.timed, law=law))
 
 
 def _next(known: list[tuple[float, float]], wanted: float, slope: float) -> float:
@@ -137,13 +171,13 @@ def best_law(
     notes: tuple[Note, ...] = ()
     try:
         found = refined(course, grid, solve, goal, most, deadline)
-        law, grid, rounds = found.attempt.law.law, found.grid, found.rounds
+        law, grid, rounds, spline = found.attempt.law.law, found.grid, found.rounds, found.attempt.spline
     except SolverFailed as error:
         if not course.rests:
             raise
-        law, rounds = smooth_law(course.curve), 0
+        law, rounds, spline = smooth_law(course.curve), 0, None
         notes = (Note("not_optimal", f"no time-optimal profile was found ({error.status}): a smooth law stands in"),)
-    return Answer(course, Timed(law, time.perf_counter() - started, notes, rounds), grid)
+    return Answer(course, Timed(law, time.perf_counter() - started, notes, rounds), grid, spline)
 
 
 def _second(course: Course, grid: Array, tight: Array, before: Attempt | None, rough: bool) -> Attempt:

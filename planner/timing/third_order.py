@@ -328,6 +328,11 @@ def _read(p: Problem, y: Array, multipliers: tuple[Array, Array], iterations: in
     return Spline(p.grid, a, b, p, y, multipliers, iterations)
 
 
+def mixed(x: Spline, y: Spline, share: float) -> Spline:
+    """Return the spline (1 - share) x + share y of two on the same grid."""
+    return _read(x.problem, (1.0 - share) * x.values + share * y.values, x.multipliers, x.iterations)
+
+
 def first_guess(ceiling: Array) -> Array:
     """Return values a to begin with: those of the fastest profile without jerk limits, but nowhere near 0."""
     return np.asarray(np.maximum(ceiling, 1e-2 * ceiling[ceiling > 0].min()))
