@@ -6,8 +6,8 @@ from ..markdown import number, table
 from . import end_to_end, first_call, given_stations, quality, with_jerk
 from .rows import DENSE, Timing
 
-ABOUT = f"""The fastest law along a given path (a cubic spline, with seven joints; of copp's own examples quintic), one thread,
-process time; all calls of a problem in turn, round after round.
+ABOUT = f"""The fastest law along a given path (a cubic spline with seven joints; copp's own examples are quintic),
+one thread, process time; all calls of a problem in turn, round after round.
 
 - **Ratio**: the peer's time over that of our first entry, median of the rounds. The *goal* is the least it should be;
   for a figure of ours (*at most*) the most.
@@ -22,7 +22,8 @@ process time; all calls of a problem in turn, round after round.
 - **Quality**: plans as they are, exact extrema. **Over the best**: duration over that of the best profile known on a
   fine grid, which may break limits between its stations, and over what remains of it when slowed until it does not.
   **Gap**: to the lower bound proved, which holds for the laws that *scope* says; with a jerk limit the usual one knows
-  nothing of jerk. The milliseconds of a fixed number of stations are of solving only, by the clock.
+  nothing of jerk. *Finer* is the same solver on a grid that may lose {quality.GOAL:g} of the duration (at most
+  {quality.MOST} stations), to show what is possible.
 """
 
 

@@ -41,8 +41,8 @@ def ours(course: Course, grid: Array) -> third_order.Spline:
     """Return the profile, from the path and nothing else."""
     whole = np.ones((4, len(grid) - 1, course.curve.dims))
     ceiling = second_order.fastest_profile(course.without_jerk(), grid, whole)
-    guess = np.maximum(ceiling, 1e-2 * ceiling[ceiling > 0].min())
-    return third_order.solve(third_order.pose(course, grid, whole, ceiling), guess, (1.0, 0.0), TOLERANCE)
+    problem = third_order.pose(course, grid, whole, ceiling)
+    return third_order.solve(problem, third_order.first_guess(ceiling), (1.0, 0.0), TOLERANCE)
 
 
 def _problem(problem: Posed, count: int, quick: bool) -> list[Timing]:

@@ -30,6 +30,8 @@ MOST = 40_000, 10_000
 FIRST = 64, 8
 #: Halvings of the intervals next to rests: without jerk limits s grows as t² there, with them as t³.
 HALVINGS = 6, 12
+#: Ends where sdot² is below this share of its largest are slow ones, next to which the grid is to be finer.
+SLOW = 0.1
 #: The same share where limits are not meant to be used in full: the grid is split only where they are broken.
 UNUSED = 1e3
 #: Tolerances of the interior point while the grid changes, and at last.
@@ -163,8 +165,10 @@ def best_law(
     if grid is None:
         scale = 4 if price > 0.0 else 1
         count = stations or scale * max(FIRST[0], FIRST[1] * course.curve.pieces)
-        rests = course.start[0] == 0.0, course.end[0] == 0.0
-        grid = initial_grid(course.curve, count, rests, HALVINGS[third])
+        grid = initial_grid(course.curve, count, (False, False))
+        fast = 0.0 if course.rests else float(second_order.fastest_profile(course.without_jerk(), grid).max())
+        slow = course.start[0] ** 2 <= SLOW * fast, course.end[0] ** 2 <= SLOW * fast
+        grid = initial_grid(course.curve, count, slow, HALVINGS[third])
     most = max(MOST[third], 2 * len(grid))
     started = time.perf_counter()
     solve = partial(_third, course, price) if third else partial(_second, course)
@@ -185,7 +189,7 @@ def _second(course: Course, grid: Array, tight: Array, before: Attempt | None, r
 
 
 def _third(course: Course, price: float, grid: Array, tight: Array, before: Attempt | None, rough: bool) -> Attempt:
-    ceiling = second_order.fastest_profile(course.without_jerk(), grid, np.ones_like(tight))
+    ceiling = second_order.fastest_profile(course.without_jerk(), grid)
     if before is None or before.spline is None:
         guess = third_order.first_guess(ceiling)
     else:

@@ -119,11 +119,9 @@ def duration_bound(
     for course, grid in zip(courses, grids, strict=True):
         deadline.left()
         whole = np.ones((4, len(grid) - 1, course.curve.dims))
-        ceiling = second_order.fastest_profile(course.without_jerk(), grid, whole)
+        ceiling = second_order.fastest_profile(course.without_jerk(), grid)
         problem = third_order.pose(course, grid, whole, ceiling)
-        splines.append(
-            third_order.solve(problem, np.maximum(ceiling, 1e-2 * ceiling[ceiling > 0].min()), (1.0, 0.0), PRECISE)
-        )
+        splines.append(third_order.solve(problem, third_order.first_guess(ceiling), (1.0, 0.0), PRECISE))
     closer, cheap = Relaxation(tuple(splines), floor), LeastDuration(tuple(courses), tuple(grids), floor)
     if closer.lower_bound() > cheap.lower_bound():
         return Bound("on_grid", closer)

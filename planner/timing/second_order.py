@@ -13,19 +13,21 @@ from .course import Course, LawPieces
 Array = NDArray[np.float64]
 
 
-def fastest_profile(course: Course, grid: Array, tight: Array) -> Array:
+def fastest_profile(course: Course, grid: Array, tight: Array | None = None) -> Array:
     """Return a at the stations, (n + 1,), of the fastest profile.
 
     Parameters
     ----------
     tight : (4, n, D)
-        Shares of the limits (velocity, acceleration, jerk, norm) that may be used on each interval.
+        Shares of the limits (velocity, acceleration, jerk, norm) that may be used on each interval; None: all.
 
     Raises
     ------
     Infeasible
         The path speeds asked at the ends cannot be joined within the limits.
     """
+    if tight is None:
+        tight = np.ones((4, len(grid) - 1, course.curve.dims))
     status, where, a, best = _passes(course, grid, tight, 1.0)
     if status:
         _explain(course, grid, tight, status, where, best)

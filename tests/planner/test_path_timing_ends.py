@@ -200,6 +200,30 @@ def test_a_longer_law_is_smoother_than_the_fastest_one_slowed(jerk, factor):
     assert ours >= 12 * CURVE.duration**2 / duration**3 * (1 - 1e-6)
 
 
+@pytest.mark.parametrize("seed", [0, 3, 10, 41, 52])
+def test_slices_of_a_known_law(seed):
+    """Cut from a law slowed by a tenth: its own end states are met, and no later than by it."""
+    rng = np.random.default_rng(seed)
+    n, dims = int(rng.integers(3, 7)), int(rng.integers(1, 5))
+    points = rng.normal(size=(n, dims))
+    limits = {
+        name: (size * rng.uniform(0.5, 2, dims)).tolist()
+        for name, size in (("velocity", 1.0), ("acceleration", 3.0), ("jerk", 30.0))
+    }
+    answer = solve(PlanRequest.of(points, limits=limits), TimeOptimalPathOptions())
+    motion, law, curve = answer.trajectory.scaled(1.1), answer.path.law.scaled(1.1), answer.path.curve
+    times = motion.end * np.array([rng.uniform(0.02, 0.4), rng.uniform(0.6, 0.98)])
+    at = [float(law(t)[0]) for t in times]
+    inner = curve.breaks[(curve.breaks > at[0] + 1e-9) & (curve.breaks < at[1] - 1e-9)]
+    whole = curve.split(np.concatenate([at[:1], inner, at[1:]]))
+    part = whole.part(*(int(np.abs(whole.breaks - s).argmin()) for s in at))
+    path = {"polynomial": {"breaks": part.breaks.tolist(), "coefficients": part.powers().tolist()}}
+    states = [{"velocity": motion(t, 1).tolist(), "acceleration": motion(t, 2).tolist()} for t in times]
+    done = timed(part(part.breaks), limits, path, start=states[0], end=states[1])
+    assert_strict(done)
+    assert done.trajectory.duration <= (times[1] - times[0]) * (1 + 5e-4)
+
+
 @pytest.mark.parametrize("jerk", [False, True])
 @pytest.mark.parametrize("factor", [1.02, 1.5])
 def test_durations_between_moving_ends(jerk, factor):

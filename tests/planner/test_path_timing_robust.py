@@ -133,12 +133,13 @@ def test_hard_paths(name, jerk):
 @pytest.mark.parametrize("size", [1e-7, 1.0, 1e4])
 @pytest.mark.parametrize("jerk", [False, True])
 def test_a_polyline_takes_what_its_stops_take(size, jerk):
-    """Corner to corner the closed forms hold: those of ruckig."""
+    """Corner to corner it is what ruckig takes, by closed forms."""
     points = POINTS * size
     limits = {k: v for k, v in LIMITS.items() if jerk or k != "jerk"}
     done = solved(points, kind("linear"), limits)
     exact = plan(PlanRequest.of(points, limits=limits), "ruckig").trajectory.duration
-    assert exact * (1 - 1e-6) <= done.trajectory.duration <= exact * (1 + 2e-3)
+    # where cruises are long, limits are capped for ruckig: up to some 1e-4 longer than the closed form
+    assert exact * (1 - 3e-4) <= done.trajectory.duration <= exact * (1 + 2e-3)
 
 
 @pytest.mark.parametrize("jerk", [False, True])
