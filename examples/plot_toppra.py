@@ -21,7 +21,7 @@ instant one of them is at its limit, or a velocity is; the fine teeth are those 
 
 **When to use it.** For a geometric path that must not change, with velocity and acceleration limits, in milliseconds.
 
-**When not.** With a jerk limit: at each switch the acceleration jumps. `time_optimal_nlp` is for that.
+**When not.** With a jerk limit: at each switch the acceleration jumps. `time_optimal_path` is for that.
 """
 
 import numpy as np

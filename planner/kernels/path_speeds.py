@@ -120,67 +120,6 @@ def speed_caps(slopes, v_lower, v_upper, norm, tighten, caps):  # type: ignore[n
 
 
 @njit(cache=True, error_model="numpy")
-def interval_use(  # type: ignore[no-untyped-def]
-    fractions, steps, a, slopes, bends, lower, upper, v_lower, v_upper, norm, most_acc, most_speed, use
-):
-    """Write how close every interval comes to its limits, and how fully it uses the one that it uses best.
-
-    Parameters
-    ----------
-    fractions : array (P,)
-    steps : array (n,)
-    a : array (n + 1,)
-        sdot² at the stations, linear between them.
-    slopes, bends : array (P, n, D)
-        q' and q'' at the fractions of every interval.
-    lower, upper, v_lower, v_upper : array (n, D)
-        Limits of acceleration and velocity, <= 0 <=, may be infinite.
-    norm : array (n,)
-        Limit of the Euclidean norm of the velocity, may be infinite.
-    most_acc : array (n, D)
-        Overwritten with the largest ratio of a joint's acceleration to its limit, >= 0.
-    most_speed : array (n,)
-        Overwritten with the largest ratio of speed to limit, squared, of joints or of the norm.
-    use : array (n,)
-        Overwritten with the largest mean over the fractions of a joint's acceleration ratio, of its squared speed
-        ratio, or of that of the norm. 1: nothing is lost here; otherwise up to tau (1 - sqrt(use)) of the time tau.
-    """
-    points, count, dims = slopes.shape
-    x, total = np.empty(points), np.empty(points)
-    share = 1.0 / points
-    for k in range(count):
-        u = (a[k + 1] - a[k]) / (2.0 * steps[k])
-        for p in range(points):
-            x[p] = (1.0 - fractions[p]) * a[k] + fractions[p] * a[k + 1]
-            total[p] = 0.0
-        fastest = best = 0.0
-        for d in range(dims):
-            low, high = 1.0 / lower[k, d], 1.0 / upper[k, d]
-            v_low, v_high = 1.0 / v_lower[k, d], 1.0 / v_upper[k, d]
-            peak = mean = v_peak = v_mean = 0.0
-            for p in range(points):
-                w = slopes[p, k, d]
-                acceleration = bends[p, k, d] * x[p] + w * u
-                total[p] += w * w * x[p]
-                ratio = acceleration * (high if acceleration > 0.0 else low) if acceleration != 0.0 else 0.0
-                mean += ratio
-                peak = ratio if ratio > peak else peak
-                w = w * (v_high if w > 0.0 else v_low) if w != 0.0 else 0.0
-                ratio = w * w * x[p]
-                v_mean += ratio
-                v_peak = ratio if ratio > v_peak else v_peak
-            most_acc[k, d] = peak
-            fastest = max(fastest, v_peak)
-            best = max(best, max(mean, v_mean))
-        v_mean, v_high = 0.0, 1.0 / (norm[k] * norm[k])
-        for p in range(points):
-            v_mean += total[p] * v_high
-            fastest = max(fastest, total[p] * v_high)
-        most_speed[k] = fastest
-        use[k] = share * max(best, v_mean)
-
-
-@njit(cache=True, error_model="numpy")
 def _reach(steps, slopes, caps, lower, upper, first, last):  # type: ignore[no-untyped-def]
     """Return the largest sdot² that is considered at all."""
     count, dims = lower.shape

@@ -19,8 +19,8 @@ Index = NDArray[np.int64]
 State = tuple[float, float]
 
 #: Where pieces of the path are looked at for a standstill: a slope below this share of the mean is one.
-SHARES = (np.arange(16) + 0.5) / 16.0
-STALL = 0.1
+SHARES = (np.arange(32) + 0.5) / 32.0
+STALL = 0.3
 #: Where an interval with one piece of law, or each of two pieces, is looked at, in shares of the piece's duration.
 POINTS = {1: np.array([0.0, 0.25, 0.5, 0.75, 1.0]), 2: np.array([0.0, 0.5, 1.0])}
 
@@ -60,7 +60,7 @@ class Course:
         inside = self.curve.breaks[:-1, None] + np.diff(self.curve.breaks)[:, None] * SHARES
         slope = np.abs(self.curve.states(inside, 1, first=1)[0])
         slope = (slope / np.minimum(self.upper[2], -self.lower[2])[:, None]).max(axis=2).reshape(-1)
-        return bool(slope[len(SHARES) : -len(SHARES)].min(initial=np.inf) < STALL * slope.mean())
+        return bool(slope[len(SHARES) // 4 : -len(SHARES) // 4].min(initial=np.inf) < STALL * slope.mean())
 
     @property
     def rests(self) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverFailed
+from ..errors import Infeasible, SolverFailed
 from ..jumps import counted_jumps
 from ..limits import Limits
 from ..paths import Path, refuse_position_limits
@@ -61,6 +61,9 @@ class Timed:
 #: What a dwell takes of the whole motion: the path asks for one, nothing says how long.
 DWELL = 1e-6
 
+#: Between moving ends, which no slow-down leaves alone, limits may be passed by this in speed.
+UNKEPT = 2e-7
+
 #: Times one course, from its start to its end state.
 TimeCourse = Callable[[Course], Timed]
 
@@ -96,7 +99,7 @@ def follow(
     Raises
     ------
     Infeasible
-        It takes longer than the duration allows.
+        It takes longer than the duration allows, or breaks limits between moving ends.
     SolverFailed
         The laws do not fit together.
     """
@@ -113,6 +116,12 @@ def follow(
         factor = duration / trajectory.duration
         trajectory, law, times = trajectory.scaled(factor), law.scaled(factor), times * factor
     else:
+        needed = max(slowdown(trajectory, request, times).factor, norm_factor(trajectory, request, times))
+        if needed > 1.0 + UNKEPT:
+            raise Infeasible(
+                "no law with the velocities and accelerations asked at the ends was found within the limits; the best "
+                f"found is {needed:.6g} times too fast somewhere: ask for less at the ends"
+            )
         stretched(trajectory.duration, request.duration)
     if len(each) > 1:
         kind = "corner" if not any(c.jerk for c in each) else "corner or jump of curvature"

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import linprog
 
 from planner import curves
-from planner.kernels.path_speeds import fastest_speeds, interval_derivatives, interval_use, speed_caps
+from planner.kernels.path_speeds import fastest_speeds, interval_derivatives, speed_caps
 from planner.kernels.path_speeds_bound import least_duration
 from planner.paths import PathOptions, build_path
 from planner.trajectory import Trajectory
@@ -250,33 +250,6 @@ def test_norm_and_tightening():
     solved = Solved(curve, limits, limits, grid, norm=1.0).check()
     assert solved.duration == pytest.approx(5.0 + 1.0 / 2.5, rel=1e-3)
     assert solved.bound(curve) == pytest.approx(5.0 + 1.0 / 2.5, rel=1e-9)
-
-
-# -- use -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["rand7_w5_s0", "toppra_scalar", "copp_randspline_0"])
-def test_use(name):
-    curve, velocity, acceleration = case(name)
-    solved = Solved(curve, velocity, acceleration, uniform(curve, 1000))
-    n, dims = solved.lower.shape
-    fractions = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-    slopes, bends = derivatives(curve, solved.grid, fractions)
-    most_acc, most_speed, use = np.empty((n, dims)), np.empty(n), np.empty(n)
-    interval_use(
-        fractions, solved.steps, solved.a, slopes, bends, solved.lower, solved.upper, solved.v_lower, solved.v_upper,
-        solved.norm, most_acc, most_speed, use,
-    )  # fmt: skip
-    x = solved.a[:-1] + fractions[:, None] * np.diff(solved.a)
-    u = np.diff(solved.a) / (2.0 * solved.steps)
-    acc = bends * x[:, :, None] + slopes * u[:, None]
-    speed = slopes * np.sqrt(x)[:, :, None]
-    acc = np.maximum(acc / solved.upper, acc / solved.lower)
-    speed = np.maximum(speed / solved.v_upper, speed / solved.v_lower) ** 2
-    assert most_acc == pytest.approx(acc.max(axis=0), rel=1e-9, abs=1e-9)
-    assert most_speed == pytest.approx(speed.max(axis=(0, 2)), rel=1e-9, abs=1e-9)
-    assert use == pytest.approx(np.maximum(acc.mean(axis=0), speed.mean(axis=0)).max(axis=1), rel=1e-9)
-    assert use.mean() > 0.98 and use.max() <= 1.01
 
 
 # -- references ------------------------------------------------------------------------------------------------------
