@@ -98,6 +98,7 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     timed = can.timing == "given" and request.times is not None
     if timed or moving or _bounded_or_asked(request):
         refuse_hopeless(request, not options.control_points, timed)
+    rounding = None if options.rounding is None else np.full(request.dims, options.rounding)
     demands = Demands(
         dims=request.dims,
         limits=request.limits,
@@ -109,8 +110,8 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         start=start,
         end=end,
         waypoint_states=original.waypoint_states,
-        waypoint_tolerance=original.waypoint_tolerance,
-        tube=original.tube,
+        waypoint_tolerance=original.waypoint_tolerance if rounding is None else rounding,
+        tube=original.tube if rounding is None else rounding,
         closed=can.continuity if options.closed else 0,
     )
     return Asked(request, demands, kept, still, tuple(notes))

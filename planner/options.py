@@ -74,6 +74,11 @@ class Options(BaseModel):
         return False
 
     @property
+    def rounding(self) -> float | None:
+        """By how much the path between waypoints may leave their polyline to round its corners; None: not at all."""
+        return None
+
+    @property
     def closed(self) -> bool:
         """Whether the derivatives at the end are those at the start, up to the class the method guarantees."""
         return False

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 from pydantic import Field
 
+from ..curves.rounded import rounded_polyline
 from ..deadline import Deadline
-from ..errors import Infeasible, SolverFailed, Unsupported
+from ..errors import Infeasible, InvalidRequest, SolverFailed, Unsupported
 from ..method import Capabilities, Method, Reference
-from ..paths import PathOptions, build_path
+from ..options import MAX_VALUE
+from ..paths import LinearPath, Path, PathOptions, build_path
 from ..timing.ends import path_state
 from ..timing.fastest import Answer, fastest, lasting
 from ..timing.following import Timed, cut_at_corners, follow
@@ -25,12 +27,30 @@ class TimeOptimalPathOptions(PathOptions):
         le=1_000_000,
         description="fixed number of stations (default: as many as are needed to lose less than 0.1 %)",
     )
+    corner_tolerance: float | None = Field(
+        default=None,
+        gt=0,
+        le=MAX_VALUE,
+        description="linear path only: corners are rounded, nowhere further from the polyline than this in any joint "
+        "(default: the motion stops at corners)",
+    )
+
+    @property
+    def rounding(self) -> float | None:
+        """The corner tolerance."""
+        return self.corner_tolerance
 
 
 def solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
     """Return the path run through as fast as the limits allow, or as the duration asks."""
     deadline = Deadline(request.timeout)
     path = build_path(options.path, request.waypoints)
+    if options.corner_tolerance is not None:
+        if not isinstance(options.path, LinearPath) or options.path.knots is not None:
+            reason = "rounds the corners of a linear path without knots"
+            raise InvalidRequest.of("/options/corner_tolerance", "conflict", reason)
+        path = Path(*rounded_polyline(request.waypoints, options.corner_tolerance))
+        path = replace(path, curve=path.curve.split(path.knots))
     start, end = (path_state(path.curve, getattr(request, side), side) for side in ("start", "end"))
     courses = cut_at_corners(path, request, start, end)
     answers = fastest(courses, options.stations, deadline)
@@ -50,6 +70,8 @@ def solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
                 reason = f"from or to a moving end the duration is not met: {error}"
                 raise Unsupported("time_optimal_path", "duration", reason=reason) from None
             answer = follow(path, request, courses, _laws(answers), solver)  # the fastest, slowed
+    if options.corner_tolerance is not None:  # what is told is how far the polyline is left
+        answer = replace(answer, path=None)
     return replace(answer, bound=bound)
 
 
