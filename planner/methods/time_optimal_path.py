@@ -24,7 +24,7 @@ class TimeOptimalPathOptions(PathOptions):
     stations: int | None = Field(
         default=None,
         ge=10,
-        le=1_000_000,
+        le=20_000,
         description="fixed number of stations (default: as many as are needed to lose less than 0.1 %)",
     )
     corner_tolerance: float | None = Field(
@@ -43,6 +43,14 @@ class TimeOptimalPathOptions(PathOptions):
 
 def solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
     """Return the path run through as fast as the limits allow, or as the duration asks."""
+    try:
+        return _solve(request, options)
+    except SolverFailed as error:
+        reason = f"no law was found that is one: {error}"
+        raise Unsupported("time_optimal_path", "path", ["time_optimal_nlp", "trapezoidal"], reason) from None
+
+
+def _solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
     deadline = Deadline(request.timeout)
     path = build_path(options.path, request.waypoints)
     if options.corner_tolerance is not None:
