@@ -1,7 +1,5 @@
 """Re-evaluation of lower bounds: a number counts only if it follows again from the evidence handed over."""
 
-import math
-
 from .limits import QUANTITIES
 from .trajectory import Trajectory
 from .types import Bound, Certificate, Minimised, Objective, Optimality
@@ -13,6 +11,10 @@ _WORDS = {
     "squared_snap": Minimised("squared_snap", 4),
     "duration": Minimised("duration", 0, 1.0),
 }
+
+
+#: A bound above the value by no more than this, relatively, is one that limits kept to that allow.
+BEYOND = 1e-6
 
 
 def minimised_by(word: str | None) -> Minimised | None:
@@ -38,7 +40,7 @@ def objective(
         value += trajectory.squared_integral(minimised.order) if known is None else known
     kkt = dict(bound.evidence.residuals()) if bound is not None and isinstance(bound.evidence, Optimality) else None
     low = None if bound is None else bound.evidence.lower_bound()
-    if bound is None or low is None or not math.isfinite(low):
+    if bound is None or low is None or not low <= value * (1.0 + BEYOND):  # one above the value is disproved by it
         return Objective(minimised.name, value, None, None, None, kkt)
     if abs(value - low) <= 1e-12 * abs(value):  # equal but for rounding
         low = min(low, value)

@@ -276,8 +276,9 @@ def _time(step, lines, at):  # type: ignore[no-untyped-def]
         for i in range(3):
             y0, y1 = lines[i, 0], lines[i, 1]
             if y0 < np.inf and y1 < np.inf:
-                left = min(left, max(y0 + (y1 - y0) * x0, 0.0))
-                right = min(right, max(y0 + (y1 - y0) * x1, 0.0))
+                noise = 1e-15 * max(y0, y1)  # a that is too large only makes the bound too low
+                left = min(left, max(y0 * (1.0 - x0) + y1 * x0, 0.0) + noise)
+                right = min(right, max(y0 * (1.0 - x1) + y1 * x1, 0.0) + noise)
         if x1 > x0:
             total += (x1 - x0) * 2.0 / (np.sqrt(left) + np.sqrt(right))
     return total * step

@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 from pydantic import Field
 
 from ..curves.rounded import rounded_polyline
 from ..deadline import Deadline
 from ..errors import Infeasible, InvalidRequest, SolverFailed, Unsupported
+from ..limits import Boundary
 from ..method import Capabilities, Method, Reference
 from ..options import MAX_VALUE
 from ..paths import LinearPath, Path, PathOptions, build_path
@@ -47,6 +49,9 @@ def solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
         return _solve(request, options)
     except SolverFailed as error:
         reason = f"no law was found that is one: {error}"
+        moving = [f"boundary_{n}" for side in (request.start, request.end) for n in side.given() if _moves(side, n)]
+        if moving:
+            raise Unsupported("time_optimal_path", ", ".join(dict.fromkeys(moving)), (), reason) from None
         raise Unsupported("time_optimal_path", "path", ["time_optimal_nlp", "trapezoidal"], reason) from None
 
 
@@ -81,6 +86,10 @@ def _solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
     if options.corner_tolerance is not None:  # what is told is how far the polyline is left
         answer = replace(answer, path=None)
     return replace(answer, bound=bound)
+
+
+def _moves(state: Boundary, name: str) -> bool:
+    return bool(np.nan_to_num(getattr(state, name)).any())
 
 
 def _laws(answers: list[Answer | None]) -> list[Timed | None]:

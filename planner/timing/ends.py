@@ -9,6 +9,8 @@ from ..trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
+#: Velocities and accelerations below this are rest.
+STILL = 3e-7
 #: What is asked may leave the path's direction by this, relatively.
 ALIGNED = 1e-9
 
@@ -35,6 +37,8 @@ def path_state(curve: Trajectory, state: Boundary, side: str) -> tuple[float, fl
         if speed < 0:
             reason = "must point along the path, which is not run backwards"
             raise InvalidRequest.of(f"/{side}/velocity", "bad_boundary", reason)
+    if speed * float(np.abs(tangent).max()) <= STILL:  # within what a state at rest may differ from the one asked
+        speed = 0.0
     push = 0.0
     if state.acceleration is not None and not np.isnan(state.acceleration).all():
         rest = np.nan_to_num(state.acceleration) - bend * speed * speed
@@ -43,6 +47,8 @@ def path_state(curve: Trajectory, state: Boundary, side: str) -> tuple[float, fl
         if speed == 0.0 and (push < 0.0 if side == "start" else push > 0.0):
             reason = "would move backwards along the path from rest"
             raise InvalidRequest.of(f"/{side}/acceleration", "bad_boundary", reason)
+    if abs(push) * float(np.abs(tangent).max()) <= STILL:
+        push = 0.0
     return speed, push
 
 

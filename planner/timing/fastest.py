@@ -168,7 +168,7 @@ def best_law(
         grid = initial_grid(course.curve, count, (False, False))
         fast = 0.0 if course.rests else float(second_order.fastest_profile(course.without_jerk(), grid).max())
         slow = course.start[0] ** 2 <= SLOW * fast, course.end[0] ** 2 <= SLOW * fast
-        grid = initial_grid(course.curve, count, slow, HALVINGS[third])
+        grid = initial_grid(course.curve, count, slow, HALVINGS[third and not course.curve.rational])
     most = max(MOST[third], 2 * len(grid))
     started = time.perf_counter()
     solve = partial(_third, course, price) if third else partial(_second, course)
