@@ -276,11 +276,11 @@ def _time(step, lines, at):  # type: ignore[no-untyped-def]
         for i in range(3):
             y0, y1 = lines[i, 0], lines[i, 1]
             if y0 < np.inf and y1 < np.inf:
-                noise = 1e-15 * max(y0, y1)  # a that is too large only makes the bound too low
-                left = min(left, max(y0 * (1.0 - x0) + y1 * x0, 0.0) + noise)
-                right = min(right, max(y0 * (1.0 - x1) + y1 * x1, 0.0) + noise)
+                noise = 1e-15 * max(y0, y1)  # of x, where lines cross: a too large only makes the bound too low
+                left = min(left, y0 * (1.0 - x0) + y1 * x0 + (noise if x0 > 0.0 else 0.0))
+                right = min(right, y0 * (1.0 - x1) + y1 * x1 + (noise if x1 < 1.0 else 0.0))
         if x1 > x0:
-            total += (x1 - x0) * 2.0 / (np.sqrt(left) + np.sqrt(right))
+            total += (x1 - x0) * 2.0 / (np.sqrt(max(left, 0.0)) + np.sqrt(max(right, 0.0)))
     return total * step
 
 

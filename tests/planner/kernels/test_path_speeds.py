@@ -249,7 +249,7 @@ def test_norm_and_tightening():
     assert caps == pytest.approx(expected)
     solved = Solved(curve, limits, limits, grid, norm=1.0).check()
     assert solved.duration == pytest.approx(5.0 + 1.0 / 2.5, rel=1e-3)
-    assert solved.bound(curve) == pytest.approx(5.0 + 1.0 / 2.5, rel=1e-9)
+    assert solved.bound(curve) == pytest.approx(5.0 + 1.0 / 2.5, rel=1e-8)
 
 
 # -- references ------------------------------------------------------------------------------------------------------
