@@ -15,6 +15,8 @@ from toppra.interpolator import AbstractGeometricPath
 from planner import PlanRequest, plan
 from planner.paths import PathOptions, build_path
 
+pytestmark = pytest.mark.slow
+
 JOINTS = 7
 
 
@@ -126,7 +128,6 @@ def test_a_few_against_toppra():
     against_toppra(seeds((0, 6)))
 
 
-@pytest.mark.slow
 def test_two_hundred_against_toppra():
     """All solved, strict, with and without jerk; none longer than toppra's slowed to be strict too."""
     against_toppra(seeds((0, 200)))
