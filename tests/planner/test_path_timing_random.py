@@ -148,5 +148,6 @@ def against_ipopt(chosen):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif("WAYWRIGHT_SEEDS" not in os.environ, reason="a campaign: WAYWRIGHT_SEEDS=first:last")
 def test_with_jerk_against_ipopt():
     against_ipopt(seeds((0, 20)))
