@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from ..curves.rounded import rounded_polyline
@@ -19,6 +20,8 @@ from ..timing.path_bounds import duration_bound
 from ..timing.scaling import stretched
 from ..types import PlanRequest, Solution
 
+Array = NDArray[np.float64]
+
 
 class TimeOptimalPathOptions(PathOptions):
     """Options of the time-optimal law on a path."""
@@ -27,7 +30,7 @@ class TimeOptimalPathOptions(PathOptions):
         default=None,
         ge=10,
         le=20_000,
-        description="fixed number of stations (default: as many as are needed to lose less than 0.1 %)",
+        description="fixed number of stations (default: as many as an estimated loss of 0.1 % needs, 10,000 with jerk)",
     )
     corner_tolerance: float | None = Field(
         default=None,
@@ -41,6 +44,18 @@ class TimeOptimalPathOptions(PathOptions):
     def rounding(self) -> float | None:
         """The corner tolerance."""
         return self.corner_tolerance
+
+    def check(self, points: Array) -> None:
+        """Raise InvalidRequest where the path's options do not fit the waypoints, or its corners cannot be rounded."""
+        super().check(points)
+        self.refuse_rounding()
+
+    def refuse_rounding(self) -> None:
+        """Raise InvalidRequest where corners are to be rounded that no polyline has."""
+        if self.corner_tolerance is None or isinstance(self.path, LinearPath) and self.path.knots is None:
+            return
+        reason = "rounds the corners of a linear path without knots"
+        raise InvalidRequest.of("/options/corner_tolerance", "conflict", reason)
 
 
 def solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
@@ -58,10 +73,8 @@ def solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
 def _solve(request: PlanRequest, options: TimeOptimalPathOptions) -> Solution:
     deadline = Deadline(request.timeout)
     path = build_path(options.path, request.waypoints)
+    options.refuse_rounding()
     if options.corner_tolerance is not None:
-        if not isinstance(options.path, LinearPath) or options.path.knots is not None:
-            reason = "rounds the corners of a linear path without knots"
-            raise InvalidRequest.of("/options/corner_tolerance", "conflict", reason)
         path = Path(*rounded_polyline(request.waypoints, options.corner_tolerance))
         path = replace(path, curve=path.curve.split(path.knots))
     start, end = (path_state(path.curve, getattr(request, side), side) for side in ("start", "end"))

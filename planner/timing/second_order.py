@@ -101,12 +101,13 @@ def _explain(course: Course, grid: Array, tight: Array, status: int, where: int,
     enough = high < 1e12
     possible = f"; the largest speed there is {np.sqrt(best[0]) / speed:.6g} of that asked" if status == 2 else ""
     side = "start" if start else "end"
+    message = f"the velocity asked at the {side} breaks a limit of velocity"
+    if enough:
+        verb = "left" if start else "reached"
+        message = f"the velocity asked at the {side} cannot be {verb} within the limits: joint {joint} would need "
+        message += f"{high:.6g} times its acceleration"
     raise Infeasible(
-        f"the velocity asked at the {side} cannot be {'left' if start else 'reached'} within the limits: joint {joint} "
-        f"would need {high:.6g} times its acceleration"
-        * enough
-        + f"the velocity asked at the {side} breaks a limit of velocity" * (not enough)
-        + possible,
+        message + possible,
         joint=joint if enough else int(np.argmax(np.abs(slope))),
         quantity="acceleration" if enough else "velocity",
         bound=float(limit[joint]) if enough else None,

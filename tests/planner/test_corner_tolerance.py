@@ -76,6 +76,12 @@ def test_other_paths_are_refused(path):
     assert [(e.field, e.code) for e in caught.value.errors] == [("/options/corner_tolerance", "conflict")]
 
 
+def test_other_paths_are_refused_where_nothing_moves():
+    with pytest.raises(InvalidRequest) as caught:
+        plan(PlanRequest.of([[1.0], [1.0]], limits=LIMITS), "time_optimal_path", {"corner_tolerance": 0.1})
+    assert caught.value.errors[0].field == "/options/corner_tolerance"
+
+
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("inf")])
 def test_a_tolerance_is_a_width(tolerance):
     request = PlanRequest.of([[0.0], [1.0]], limits=LIMITS)
