@@ -15,33 +15,36 @@ export NUMEXPR_NUM_THREADS := 1
 export VECLIB_MAXIMUM_THREADS := 1
 export MPLBACKEND := Agg
 
-.PHONY: help demo test serve check check-slow bench docs gallery constraints clean
+.PHONY: help demo test serve check check-slow bench campaign docs gallery constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## say what there is
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
 
-demo: .venv/.installed  ## start the service, plan a pick and place with every method, draw build/demo.png
+demo: .venv/.kernels  ## start the service, plan a pick and place with every method, draw build/demo.png
 	$(PY) examples/demo.py
 
-test: .venv/.installed  ## run the tests (pick some with ARGS="-k word")
+test: .venv/.kernels  ## run the tests (pick some with ARGS="-k word")
 	$(PY) -m pytest -m "not slow" $(ARGS)
 
 serve: .venv/.installed  ## run the service on http://127.0.0.1:8000 (other settings with ARGS="--port 9000")
 	$(PY) -m api serve $(ARGS)
 
-check: .venv/.installed  ## what a change must pass: lint, format, types, tests
+check: .venv/.kernels  ## what a change must pass: lint, format, types, tests
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
 	$(PY) -m mypy
-	$(PY) -m pytest -m "not slow"
+	WAYWRIGHT_EXAMPLES=10 $(PY) -m pytest -m "not slow"
 
-check-slow: .venv/.installed  ## the slow tests, and the packages installed in clean environments
+check-slow: .venv/.kernels  ## the slow tests, and the packages installed in clean environments
 	$(PY) -m pytest -m slow
 	.ci/packages $(PY)
 
 bench: .venv/.bench  ## compare with peers: build/bench/report.md (a fast look with ARGS=--quick)
 	$(PY) -m benchmarks $(ARGS)
+
+campaign: .venv/.installed  ## attack a running service, for hours: build/campaign/report.md (minutes with ARGS="--size ci")
+	$(PY) -m benchmarks.campaign $(ARGS)
 
 docs: .venv/.installed  ## rewrite the pages that are made from the code
 	$(PY) -c 'from planner.catalogue import markdown; open("docs/methods.md", "w", encoding="utf-8").write(markdown())'
@@ -65,6 +68,11 @@ ifneq ($(shell test -x $(PY) && cat .venv/.installed 2>/dev/null),$(CURDIR))
 endif
 
 # Always from nothing, so that an installation that was interrupted half way leaves no trace.
+.venv/.kernels: .venv/.installed $(wildcard planner/kernels/*.py)
+	@echo 'Compiling the kernels: once, for two or three minutes.'
+	$(PY) -c 'from api.engine.warm import warm; warm()'
+	touch $@
+
 .venv/.installed: pyproject.toml constraints.txt
 	@command -v "$(PYTHON)" >/dev/null || { echo "make: there is no $(PYTHON); name a Python 3.11 or newer with PYTHON=..."; exit 1; }
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \

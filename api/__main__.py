@@ -1,11 +1,12 @@
-"""The command line: ``waywright plan | compare | certify | retime | methods | serve``. No FastAPI except to serve."""
+"""The command line: ``waywright plan | compare | certify | … | serve | key``. No FastAPI except to serve."""
 
 import argparse
 import json
 import os
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,19 +22,21 @@ from planner import (
     list_methods,
 )
 
-from . import encode
+from .controllers import CONTROLLERS, Controller, Unfit, fitted, limits_of
+from .draft import Draft
 from .errors import problem
+from .exports import EXPORTS, Export, export_of
+from .formats import written
 from .judging import certificate
-from .reading import decode, parse
+from .keys import new_key
+from .media import JSON, MSGPACK
+from .reading import decode, included, parse
 from .schemas import CertifyBody, CompareBody, PlanBody, RetimeBody
-from .settings import LOCAL, Caps
+from .settings import LOCAL, Settings
 from .tables import aligned, certificate_table, table
-from .work import Answer, answer_plan, answer_retiming, comparison
+from .work import comparison, draft_plan, draft_retiming
 
 DONE, FAILED, BAD_INPUT, INFEASIBLE = 0, 1, 2, 3
-
-#: What --out writes, by the file's ending.
-OUT = {".json": encode.JSON, ".csv": encode.CSV}
 
 
 class Usage(Exception):
@@ -53,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # `| head` has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return DONE
-    except Usage as error:
+    except (Usage, Unfit) as error:
         return _fail(str(error), BAD_INPUT)
     except InvalidRequest as error:
         for finding in error.errors[:20]:
@@ -92,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("file", metavar="FILE", help="a plan request as JSON; - for standard input")
     plan.add_argument("-m", "--method", help="a method's id, or auto; instead of the request's")
     plan.add_argument("-o", "--option", action="append", default=[], metavar="NAME=VALUE", help="an option, as JSON")
-    plan.add_argument("--out", metavar="FILE", help="write the answer to a .json or .csv file")
+    _add_out(plan)
     plan.set_defaults(run=_plan)
 
     compare = commands.add_parser(
@@ -111,7 +114,7 @@ def _parser() -> argparse.ArgumentParser:
         "retime", help="time a path anew", description="Run through a trajectory's path as fast as the limits allow."
     )
     retime.add_argument("file", metavar="FILE", help="a retiming request as JSON; - for standard input")
-    retime.add_argument("--out", metavar="FILE", help="write the answer to a .json or .csv file")
+    _add_out(retime)
     retime.set_defaults(run=_retime)
 
     methods = commands.add_parser("methods", help="list the methods", description="List the methods, or describe one.")
@@ -121,8 +124,23 @@ def _parser() -> argparse.ArgumentParser:
     serve = commands.add_parser("serve", help="run the service", description="Run the service until interrupted.")
     serve.add_argument("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
     serve.add_argument("--port", type=_port, default=8000, help="port to listen on (default 8000; 0: any free one)")
+    serve.add_argument("--api-keys", metavar="FILE", help="the keys that are admitted, made with: waywright key NAME")
+    serve.add_argument("--insecure", action="store_true", help="let other machines in without keys")
     serve.set_defaults(run=_serve)
+
+    key = commands.add_parser(
+        "key", help="make an API key", description="Make an API key, and the line of the keys file that admits it."
+    )
+    key.add_argument("name", metavar="NAME", help="whose key it is: letters, digits, dots, dashes, underscores")
+    key.set_defaults(run=_key)
     return parser
+
+
+def _add_out(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", metavar="FILE", help=f"write the answer to a file: {', '.join(EXPORTS)}")
+    parser.add_argument("--dt", type=float, metavar="SECONDS", help="sampling period, instead of the request's")
+    says = "sample as this robot controller does, and check what it will see before anything is written"
+    parser.add_argument("--controller", choices=list(CONTROLLERS), help=says)
 
 
 def _port(text: str) -> int:
@@ -133,49 +151,108 @@ def _port(text: str) -> int:
 
 
 def _read(file: str) -> Any:
+    coding = MSGPACK if file.lower().endswith(".msgpack") else JSON
     try:
-        return decode(sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes())
+        return decode(sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes(), coding)
     except OSError as error:
         raise Usage(f"{file}: {error.strerror or error}") from None
 
 
 def _plan(arguments: argparse.Namespace) -> int:
-    media_type, value = _media_type(arguments.out), _read(arguments.file)
+    export, value = _export(arguments.out), _read(arguments.file)
     if isinstance(value, dict):
         if arguments.method is not None:
             value["method"] = arguments.method
         options = {} if value.get("options") is None else value["options"]
         if arguments.option and isinstance(options, dict):  # what is no object is refused with the rest
             value["options"] = {**options, **dict(_option(text) for text in arguments.option)}
-    return _deliver(answer_plan(parse(PlanBody, value), LOCAL, media_type), arguments.out)
+    body = parse(PlanBody, _sampled(value, arguments))
+    _refuse_without_samples(body, export, arguments.controller)
+    return _deliver(draft_plan(body, LOCAL), body, export, arguments)
 
 
 def _retime(arguments: argparse.Namespace) -> int:
-    media_type, body = _media_type(arguments.out), parse(RetimeBody, _read(arguments.file))
-    return _deliver(answer_retiming(body, LOCAL, media_type), arguments.out)
+    export = _export(arguments.out)
+    body = parse(RetimeBody, _sampled(_read(arguments.file), arguments))
+    _refuse_without_samples(body, export, arguments.controller)
+    return _deliver(draft_retiming(body, LOCAL), body, export, arguments)
 
 
-def _media_type(out: str | None) -> str:
-    """Return the format of the file to be written; JSON where there is none."""
-    media_type = encode.JSON if out is None else OUT.get(Path(out).suffix.lower())
-    if media_type is None:
-        raise Usage(f"{out}: cannot write this format; available: {', '.join(OUT)}")
-    return media_type
+def _export(out: str | None) -> Export | None:
+    """Return what writes the file; None where there is none to be written."""
+    if out is None:
+        return None
+    export = export_of(Path(out).name)
+    if export is None:
+        raise Usage(f"{out}: cannot write this format; available: {', '.join(EXPORTS)}")
+    if export.missing:
+        extra = f"pip install 'waywright[{export.extra}]'"
+        raise Usage(f"{out}: writing {export.suffix} needs {export.library}, which is not installed: {extra}")
+    return export
 
 
-def _deliver(answer: Answer, out: str | None) -> int:
+def _sampled(value: Any, arguments: argparse.Namespace) -> Any:
+    """Return the request with the sampling period of the command line."""
+    dt = _period(arguments)
+    if dt is None or not isinstance(value, dict):
+        return value
+    if value.get("sampling") is not None:
+        raise Usage("/sampling: the file says where to sample, and so does --dt or --controller; give one of them")
+    return {**value, "sampling": {"dt": dt}}
+
+
+def _period(arguments: argparse.Namespace) -> float | None:
+    """Return the sampling period that the command line asks for, s."""
+    dt: float | None = arguments.dt
+    if dt is not None and not 0.0 < dt < float("inf"):
+        raise Usage(f"--dt {dt:g}: must be > 0")
+    if arguments.controller is None:
+        return dt
+    controller = CONTROLLERS[arguments.controller]
+    if dt is None:
+        return controller.period
+    periods = round(dt / controller.period)
+    if abs(dt - periods * controller.period) > 1e-9 * dt or periods < 1 or (periods > 1 and not controller.multiples):
+        also = " or a whole multiple of it" if controller.multiples else ""
+        raise Usage(f"--dt {dt:g}: {controller.name} takes a sample every {controller.period:g} s{also}")
+    return periods * controller.period
+
+
+def _refuse_without_samples(body: PlanBody | RetimeBody, export: Export | None, controller: str | None) -> None:
+    if "samples" in included(body):
+        return
+    needs = f"--controller {controller}" if controller else export.suffix if export and export.samples else None
+    if needs is not None:
+        raise InvalidRequest.of("/include", "conflict", f"{needs} needs samples, which are not included")
+
+
+def _deliver(draft: Draft, body: PlanBody | RetimeBody, export: Export | None, arguments: argparse.Namespace) -> int:
     """Write an answer to a file, or print its certificate."""
-    if out is not None:
-        _write(Path(out), answer.content)
-        print(f"wrote {out}")
-        return DONE
-    tree = decode(answer.content)
-    print(f"method: {tree['method']}" + (f" ({tree['picked_because']})" if "picked_because" in tree else ""))
-    print(f"duration: {tree['duration']:.6g} s")
-    print(certificate_table(tree["certificate"]))
-    for warning in tree["warnings"]:
+    checked = None
+    if arguments.controller is not None:
+        draft, checked = _fitted(draft, body, CONTROLLERS[arguments.controller], arguments)
+    if export is not None:
+        _write(Path(arguments.out), export.write(draft))
+        print(f"wrote {arguments.out}")
+    else:
+        tree = decode(written(replace(draft, tree={k: v for k, v in draft.tree.items() if k != "samples"}), JSON))
+        print(f"method: {tree['method']}" + (f" ({tree['picked_because']})" if "picked_because" in tree else ""))
+        print(f"duration: {tree['duration']:.6g} s")
+        print(certificate_table(tree["certificate"]))
+    for warning in draft.tree["warnings"] if export is None or checked else ():
         print(f"note: {warning['message']}")
+    if checked:
+        print(f"checked: {checked}")
     return DONE
+
+
+def _fitted(
+    draft: Draft, body: PlanBody | RetimeBody, controller: Controller, arguments: argparse.Namespace
+) -> tuple[Draft, str]:
+    """Return the draft with the samples that the controller sees, checked against the limits of the request."""
+    dt = _period(arguments)
+    assert dt is not None
+    return fitted(draft, controller, dt, *limits_of(body, draft.joints), LOCAL.samples)
 
 
 def _option(text: str) -> tuple[str, Any]:
@@ -188,7 +265,7 @@ def _option(text: str) -> tuple[str, Any]:
         return name, value
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write(path: Path, content: Iterable[bytes]) -> None:
     """Write a file in full or not at all."""
     try:
         _replace(path, content)
@@ -199,11 +276,11 @@ def _write(path: Path, content: bytes) -> None:
         raise
 
 
-def _replace(path: Path, content: bytes) -> None:
+def _replace(path: Path, content: Iterable[bytes]) -> None:
     handle, partial = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(content)
+            file.writelines(content)
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(partial, 0o666 & ~mask)
@@ -245,14 +322,31 @@ def _methods(arguments: argparse.Namespace) -> int:
 
 def _serve(arguments: argparse.Namespace) -> int:
     try:
-        from .serving import serve
+        from .serving import Misconfigured, serve
     except ImportError as error:
         return _fail(f"serving needs FastAPI and uvicorn ({error}): pip install 'waywright[service]'", FAILED)
     try:
-        Caps.from_environment()
+        settings = Settings.from_environment()
     except ValueError as error:
         raise Usage(str(error)) from None
-    return serve(arguments.host, arguments.port)
+    if arguments.api_keys == "":  # an unset variable in a script shall not open the service
+        raise Usage("--api-keys needs the name of a file")
+    if arguments.api_keys is not None:
+        settings = replace(settings, api_keys=arguments.api_keys)
+    try:
+        return serve(arguments.host, arguments.port, settings, arguments.insecure)
+    except Misconfigured as error:
+        raise Usage(str(error)) from None
+
+
+def _key(arguments: argparse.Namespace) -> int:
+    try:
+        key, line = new_key(arguments.name)
+    except ValueError as error:
+        raise Usage(str(error)) from None
+    print(f"key, to be given to its owner; it is not kept anywhere: {key}")
+    print(f"line for the keys file: {line}")
+    return DONE
 
 
 if __name__ == "__main__":

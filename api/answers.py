@@ -2,7 +2,7 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 Rows = list[list[float]]
 
@@ -67,8 +67,9 @@ class CertificateReply(Reply):
     boundary_error: float | None = Field(description="Largest miss of a state asked at an end or waypoint, relative")
     continuity: int | None = Field(description="Class C^k; null for one piece")
     path_deviation: float | None = Field(
-        description="Largest distance from the path followed, or, with a tube, from the polyline; of a retiming with a "
-        "tolerance: of a sample from the path, in any joint"
+        description="Largest distance from the path followed, or from the polyline: with a tube, and with a free path "
+        "through waypoints (time_optimal_waypoints); of a retiming with a tolerance: of a sample from the path, in any "
+        "joint"
     )
     cost: dict[str, float | None] = Field(description="squared_jerk and path_length")
     objective: ObjectiveReply | None = Field(description="null for methods that minimise nothing")
@@ -203,6 +204,10 @@ class StatusReply(Reply):
     """How the service is."""
 
     status: Literal["ok", "ready"] = Field(description="ok or ready")
+
+
+class MetricsReply(RootModel[str]):
+    """Prometheus' text format, version 0.0.4."""
 
 
 class ExplanationReply(Reply):

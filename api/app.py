@@ -12,12 +12,16 @@ from starlette.responses import Response
 
 from planner import PlannerError, __version__
 
+from .access import guard
 from .errors import Refusal
 from .middleware import Envelope
-from .openapi import components
-from .routes import certificates, comparisons, discovery, methods, retimings, trajectories
-from .settings import Caps
-from .warmup import Warmup
+from .observe import telemetry
+from .observe.middleware import Observe
+from .openapi import components, secured
+from .routes import certificates, comparisons, discovery, methods, metrics, pages, retimings, trajectories
+from .settings import Settings
+from .shedding import Shed
+from .state import State
 from .web import problem_response
 
 
@@ -29,18 +33,27 @@ class Service(FastAPI):
         if self.openapi_schema is None:
             document = super().openapi()
             document.setdefault("components", {}).setdefault("schemas", {}).update(components())
+            if self.state.keyed:
+                secured(document)
             self.openapi_schema = document
         return self.openapi_schema
 
 
-def create_app(settings: Caps | None = None) -> Service:
+def create_app(settings: Settings | None = None) -> Service:
     """Return the service as an ASGI application.
 
     Parameters
     ----------
-    settings : Caps
-        Caps on requests; by default those of the environment.
+    settings : Settings
+        By default those of the environment.
+
+    Raises
+    ------
+    ValueError
+        A setting is wrong.
     """
+    settings = Settings.from_environment() if settings is None else settings
+    spans = telemetry.config()
     app = Service(
         title="Waywright",
         version=__version__,
@@ -50,23 +63,26 @@ def create_app(settings: Caps | None = None) -> Service:
         redoc_url=None,
         redirect_slashes=False,
         lifespan=_lifespan,
+        telemetry=spans,
     )
-    app.state.caps = Caps.from_environment() if settings is None else settings
-    app.state.warmup = Warmup()
+    app.state.service = State(settings)
+    app.add_middleware(Shed, state=app.state.service)
+    app.state.keyed = guard(app, settings, app.state.service)
     app.add_middleware(Envelope)
+    # the last is the outermost
+    app.add_middleware(Observe, metrics=app.state.service.metrics, spans=spans["tracing"])
     app.add_exception_handler(PlannerError, _refused)
     app.add_exception_handler(Refusal, _refused)
     app.add_exception_handler(HTTPException, _http_error)
-    for module in (trajectories, comparisons, certificates, retimings, methods, discovery):
+    for module in (trajectories, comparisons, certificates, retimings, methods, discovery, metrics, pages):
         app.include_router(module.router)
     return app
 
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    app.state.warmup.start()
-    yield
-    app.state.warmup.stop()
+    async with app.state.service.running():
+        yield
 
 
 async def _refused(request: Request, error: Exception) -> Response:

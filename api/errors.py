@@ -10,8 +10,6 @@ import orjson
 
 from planner import ERRORS, PlannerError
 
-MEDIA_TYPE = "application/problem+json"
-
 #: Largest problem document, in bytes.
 LARGEST = 8000
 
@@ -81,6 +79,11 @@ KINDS: dict[str, Kind] = {
         415,
         "The body has a type that is not read here",
         "Send one of `available` in the header `Content-Type`, without a content encoding.",
+    ),
+    "too_slow": Kind(
+        408,
+        "The body did not come in time",
+        "The whole body must be there within `seconds` of the request's beginning; the connection is closed.",
     ),
     "unauthorized": Kind(401, "A key is needed", "Send a valid key in the header `X-API-Key`."),
     "rate_limited": Kind(429, "Too many requests", "Wait as long as the header `Retry-After` says, then try again."),

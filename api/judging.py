@@ -6,10 +6,10 @@ import numpy as np
 
 from planner import MAX_VALUE, InvalidRequest, Recorded, Trajectory, certify
 
-from . import encode
 from .reading import refuse_above, refuse_oversize
 from .schemas import CertifyBody, PolynomialBody, SamplesBody
 from .settings import Caps
+from .trees import certificate_tree
 
 #: Highest degree of a caller's polynomial: a quintic path under a jerk-limited law has 15, one polynomial through many
 #: waypoints more.
@@ -36,7 +36,7 @@ def certificate(body: CertifyBody, caps: Caps) -> dict[str, Any]:
     given = body.model_dump(include={"limits", "waypoints", "times", "start", "end"}, exclude_none=True)
     with np.errstate(all="ignore"):  # what overflows is told as unbounded
         found = certify(_trajectory(body, caps), **given)
-    return {"certificate": encode.certificate_tree(found)}
+    return {"certificate": certificate_tree(found)}
 
 
 def _trajectory(body: CertifyBody, caps: Caps) -> Trajectory | Recorded:

@@ -1,11 +1,12 @@
 """Which format the answer comes in (RFC 9110, section 12.5.1)."""
 
-from collections.abc import Sequence
+from functools import lru_cache
 
 from .errors import Refusal
 
 
-def choose(accept: str | None, available: Sequence[str]) -> str:
+@lru_cache(maxsize=512)
+def choose(accept: str | None, available: tuple[str, ...]) -> str:
     """Return the available media type that the ``Accept`` header prefers; the first one if it does not care.
 
     Of equal quality, the type that was named more exactly wins, then the earlier one of ``available``.

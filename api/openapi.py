@@ -9,8 +9,10 @@ from pydantic.json_schema import models_json_schema
 from planner import CASES
 
 from . import answers as a
-from .encode import CSV, FORMATS, JSON, ROS2
-from .errors import KINDS, MEDIA_TYPE
+from .errors import KINDS
+from .formats import FORMATS, offered
+from .media import JSON, MARKDOWN, PROBLEM, PROMETHEUS
+from .reading import READ
 from .ruckig_shape import RuckigBody
 from .schemas import CertifyBody, CompareBody, PlanBody, RetimeBody
 
@@ -21,7 +23,9 @@ _POST_ERRORS = (
     "infeasible",
     "not_acceptable",
     "too_large",
+    "too_slow",
     "unsupported_media_type",
+    "overloaded",
     "timeout",
     "solver_failed",
     "not_verified",
@@ -36,10 +40,11 @@ class Operation:
     reply: type[BaseModel]
     many: bool = False
     body: tuple[type[BaseModel], ...] = ()
-    formats: tuple[str, ...] = (JSON,)
+    formats: tuple[str, ...] = offered(whole=False)
     errors: tuple[str, ...] = ("invalid_request", "not_acceptable")
     parameters: tuple[dict[str, Any], ...] = ()
     example: Any = None
+    guard: str = "key"  # what it needs where the service has keys and rates, a name of _GUARDS
 
 
 def _parameter(name: str, where: str, description: str, **schema: Any) -> dict[str, Any]:
@@ -60,7 +65,7 @@ OPERATIONS: dict[str, Operation] = {
         "planning",
         a.PlanReply,
         body=(PlanBody, RuckigBody),
-        formats=FORMATS,
+        formats=offered(),
         errors=_POST_ERRORS,
         parameters=(_parameter("shape", "query", "ruckig: the body has the names of InputParameter", enum=["ruckig"]),),
         example=_EXAMPLE,
@@ -83,7 +88,7 @@ OPERATIONS: dict[str, Operation] = {
         "planning",
         a.PlanReply,
         body=(RetimeBody,),
-        formats=FORMATS,
+        formats=offered(),
         errors=_POST_ERRORS,
         example={
             "trajectory": {"samples": {"time": [0, 1, 2], "position": [[0, 0], [1, 2], [2, 3]]}},
@@ -100,25 +105,39 @@ OPERATIONS: dict[str, Operation] = {
     "cases": Operation("discovery", a.CaseReply, many=True),
     "limits": Operation("discovery", a.LimitsReply),
     "version": Operation("discovery", a.VersionReply),
-    "healthz": Operation("health", a.StatusReply, errors=("invalid_request",)),
-    "readyz": Operation("health", a.StatusReply, errors=("invalid_request", "overloaded")),
+    "healthz": Operation("health", a.StatusReply, formats=(JSON,), errors=("invalid_request",), guard="none"),
+    "readyz": Operation(
+        "health", a.StatusReply, formats=(JSON,), errors=("invalid_request", "overloaded"), guard="none"
+    ),
+    "metrics": Operation("health", a.MetricsReply, formats=(PROMETHEUS,), errors=("invalid_request",)),
     "explain": Operation(
         "discovery",
         a.ExplanationReply,
-        formats=(JSON, "text/markdown"),
+        formats=(*offered(whole=False), MARKDOWN),
         errors=("invalid_request", "not_found", "not_acceptable"),
         parameters=(_parameter("code", "path", "The last part of a problem's type", enum=list(KINDS)),),
+        guard="rate",
     ),
-}
-
-_TEXTS = {
-    CSV: "Header `time,position_1,…,velocity_1,…`, a row per sample",
-    ROS2: "A trajectory_msgs/JointTrajectory",
-    "text/markdown": "The explanation as text",
 }
 
 #: Echoed on every answer.
 _ID_HEADER = {"X-Request-ID": {"description": "The id sent, or one made", "schema": {"type": "string"}}}
+
+#: What goes before an operation: which errors it adds where the service has keys and rates.
+_GUARDS = {"key": ("unauthorized", "rate_limited"), "rate": ("rate_limited",), "none": ()}
+
+_RETRY = {"Retry-After": {"description": "Seconds to wait", "schema": {"type": "integer", "minimum": 0}}}
+
+#: Further headers of errors.
+_HEADERS: dict[int, dict[str, Any]] = {
+    401: {"WWW-Authenticate": {"description": "That a key is needed", "schema": {"type": "string"}}},
+    429: _RETRY
+    | {
+        "RateLimit-Policy": {"description": "What is admitted: q requests in w seconds", "schema": {"type": "string"}},
+        "RateLimit": {"description": "What is left: r requests for t seconds", "schema": {"type": "string"}},
+    },
+    503: _RETRY,
+}
 
 
 def operation(name: str) -> dict[str, Any]:
@@ -128,7 +147,9 @@ def operation(name: str) -> dict[str, Any]:
     if op.body:
         refs = [{"$ref": _ref(model)} for model in op.body]
         schema = refs[0] if len(refs) == 1 else {"anyOf": refs}
-        extra["requestBody"] = {"required": True, "content": {JSON: {"schema": schema, "example": op.example}}}
+        content = {media_type: {"schema": schema} for media_type in READ}
+        content[JSON]["example"] = op.example
+        extra["requestBody"] = {"required": True, "content": content}
     return {
         "operation_id": name,
         "tags": [op.tag],
@@ -144,24 +165,29 @@ def _ref(model: type[BaseModel]) -> str:
 
 def _responses(op: Operation) -> dict[int | str, dict[str, Any]]:
     one: dict[str, Any] = {"$ref": _ref(op.reply)}
-    content: dict[str, Any] = {JSON: {"schema": {"type": "array", "items": one} if op.many else one}}
+    first = op.formats[0]
+    content: dict[str, Any] = {first: {"schema": {"type": "array", "items": one} if op.many else one}}
     for media_type in op.formats:
-        if media_type == ROS2:
-            content[media_type] = {"schema": {"type": "object", "description": _TEXTS[media_type]}}
-        elif media_type != JSON:
-            content[media_type] = {"schema": {"type": "string", "description": _TEXTS[media_type]}}
+        if media_type != first:
+            text = FORMATS[media_type].says if media_type in FORMATS else "The same as text"
+            kind = "object" if media_type.endswith("+json") else "string"
+            content[media_type] = {"schema": {"type": kind, "description": text}}
     headers: dict[str, Any] = dict(_ID_HEADER)
-    if op.body and ROS2 in op.formats:
-        timing = "Times of validate, pose, solve, verify and encode, ms"
+    if op.body:
+        timing = "Times of validate, queue, pose, solve, verify and encode, ms"
         headers["Server-Timing"] = {"description": timing, "schema": {"type": "string"}}
     responses: dict[int | str, dict[str, Any]] = {
         200: {"description": (op.reply.__doc__ or "").splitlines()[0], "content": content, "headers": headers}
     }
-    codes = [*op.errors, "internal"] if op.errors else []
+    codes = [*op.errors, *_GUARDS[op.guard], "internal"]
     for status in sorted({KINDS[code].status for code in codes}):
         titles = [f"`{code}`: {KINDS[code].title}" for code in codes if KINDS[code].status == status]
-        problem = {MEDIA_TYPE: {"schema": {"$ref": _ref(a.Problem)}}}
-        responses[status] = {"description": "; ".join(titles), "content": problem, "headers": dict(_ID_HEADER)}
+        problem = {PROBLEM: {"schema": {"$ref": _ref(a.Problem)}}}
+        responses[status] = {
+            "description": "; ".join(titles),
+            "content": problem,
+            "headers": {**_ID_HEADER, **_HEADERS.get(status, {})},
+        }
     return responses
 
 
@@ -173,3 +199,13 @@ def components() -> dict[str, Any]:
     _, document = models_json_schema(inputs, ref_template="#/components/schemas/{model}")  # type: ignore[arg-type]
     schemas: dict[str, Any] = document["$defs"]
     return schemas
+
+
+def secured(document: dict[str, Any]) -> None:
+    """Write into a document that the operations need a key."""
+    scheme = {"type": "apiKey", "in": "header", "name": "X-API-Key", "description": "A key that the operator gave out"}
+    document["components"]["securitySchemes"] = {"key": scheme}
+    for operations in document["paths"].values():
+        for op in operations.values():
+            if OPERATIONS[op["operationId"]].guard == "key":
+                op["security"] = [{"key": []}]

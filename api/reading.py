@@ -6,25 +6,45 @@ from typing import Any, TypeVar
 import jiter
 from pydantic import BaseModel, ValidationError
 
-from planner import FieldError, InvalidRequest, PlanRequest, Sampling, TooLarge, invalid, pointer, sample_count
+from planner import (
+    FieldError,
+    InvalidRequest,
+    PlanRequest,
+    Sampling,
+    TooLarge,
+    invalid,
+    pointer,
+    sample_count,
+)
+from planner.sampling import refuse_too_many
 
+from .media import JSON, MSGPACK
+from .packed import unpack
 from .schemas import CompareBody, MotionBody, RetimeBody
 from .settings import Caps
 
+#: Media types of a body.
+READ = (JSON, MSGPACK)
+
+#: Time limit, s, of what comes to be solved when its time has run out.
+SHORTEST = 1e-6
+
 Model = TypeVar("Model", bound=BaseModel)
 
-#: Fields of a motion body that are read on their own.
-_OURS = {"waypoints", "sampling", "include"}
+#: What a request to the planner has of a body's fields, but for those that are read on their own.
+_ASKED = tuple(f.name for f in fields(PlanRequest) if f.name not in ("waypoints", "timeout", "bound"))
 
 
-def decode(raw: bytes) -> Any:
-    """Return the JSON value; ``NaN`` and numbers beyond floats come through, so that their field can be named.
+def decode(raw: bytes, coding: str = JSON) -> Any:
+    """Return the value of a body; ``NaN`` and numbers beyond floats come through, so that their field can be named.
 
     Raises
     ------
     InvalidRequest
-        ``not_json``: not JSON, not UTF-8, nested too deeply, or with a key twice in an object.
+        ``not_json``: not what its coding says, not UTF-8, nested too deeply, or with a key twice in an object.
     """
+    if coding == MSGPACK:
+        return unpack(raw)
     try:
         return jiter.from_json(raw, allow_inf_nan=True, catch_duplicate_keys=True)
     except ValueError as error:
@@ -71,42 +91,59 @@ def included(body: MotionBody | RetimeBody) -> tuple[str, ...]:
     return tuple(name for name in ("samples", "polynomial", "bound") if name in asked)
 
 
-def to_request(body: MotionBody, caps: Caps, share: int = 1) -> tuple[PlanRequest, Sampling]:
+def asked(body: MotionBody) -> dict[str, Any]:
+    """Return what a body asks of the trajectory besides waypoints and time to compute it, models as dicts.
+
+    What pydantic's ``model_dump`` would return, without its copies of all lists.
+    """
+    found = {name: getattr(body, name) for name in _ASKED}
+    return {name: _dumped(value) for name, value in found.items() if value is not None}
+
+
+def _dumped(value: Any) -> Any:
+    if isinstance(value, BaseModel):
+        return value.model_dump(exclude_none=True)
+    if type(value) is list and any(isinstance(entry, BaseModel) for entry in value):
+        return [_dumped(entry) for entry in value]
+    return value
+
+
+def to_request(body: MotionBody, caps: Caps, share: int = 1, spent: float = 0.0) -> tuple[PlanRequest, Sampling]:
     """Return the planner's request and where to sample.
 
     Parameters
     ----------
     share : int
         How many answers share the cap on samples.
+    spent : float
+        Seconds of the time limit that have gone by.
 
     Raises
     ------
     InvalidRequest, TooLarge
     """
     refuse_oversize(body.waypoints, caps)
-    timeout = timeout_of(body, caps)
-    names = {f.name for f in fields(PlanRequest)} & type(body).model_fields.keys() - _OURS
-    given = body.model_dump(include=names, exclude_none=True)
-    given["timeout"] = timeout
-    given["bound"] = "bound" in included(body)
-    request = PlanRequest.of(body.waypoints, **given)
+    timeout = timeout_of(body, caps, spent)
+    include = included(body)
+    request = PlanRequest.of(body.waypoints, **asked(body), timeout=timeout, bound="bound" in include)
     sampling = sampling_of(body)
-    if "samples" in included(body):
+    if "samples" in include:
         _refuse_samples(request, sampling, caps.samples // share)
     return request, sampling
 
 
-def timeout_of(body: MotionBody | RetimeBody, caps: Caps) -> float:
-    """Return the seconds that the answer may take.
+def timeout_of(body: MotionBody | RetimeBody, caps: Caps, spent: float = 0.0) -> float:
+    """Return the seconds that are left for the answer.
 
     Raises
     ------
     InvalidRequest
-        More than the cap was asked for.
+        Nothing, or more than the cap, was asked for.
     """
-    if body.timeout is not None and body.timeout > caps.timeout:
-        raise InvalidRequest.of("/timeout", "out_of_range", f"may be at most {caps.timeout:g} s")
-    return caps.timeout if body.timeout is None else body.timeout
+    if body.timeout is not None and not 0 < body.timeout <= caps.timeout:
+        raise InvalidRequest.of("/timeout", "out_of_range", f"must be > 0 and at most {caps.timeout:g} s")
+    whole = caps.timeout if body.timeout is None else body.timeout
+    return max(whole - spent, SHORTEST)
 
 
 def sampling_of(body: MotionBody | RetimeBody) -> Sampling:
@@ -130,7 +167,4 @@ def _refuse_samples(request: PlanRequest, sampling: Sampling, most: int) -> None
 
 def refuse_count(sampling: Sampling, least: float, dims: int, most: int) -> None:
     """Refuse more samples of a trajectory that takes at least ``least`` seconds than the cap allows."""
-    count = sample_count(sampling, least)
-    if count * dims > most:
-        hint = f"at least {count:,} samples of {dims} joints were asked; take fewer, or leave samples out"
-        raise TooLarge("samples x joints", most, hint)
+    refuse_too_many(sample_count(sampling, least), dims, most, sampling, least)

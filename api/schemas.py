@@ -19,6 +19,8 @@ Seconds = Annotated[float, Field(strict=True, ge=0, le=MAX_TIME, allow_inf_nan=F
 Coefficient = Annotated[float, Field(strict=True, ge=-1e100, le=1e100, allow_inf_nan=False)]
 Text = Annotated[str, Field(strict=True, max_length=200)]
 
+Names = Annotated[list[Text], Field(fail_fast=True)]
+
 Vector = Annotated[list[Number], Field(fail_fast=True)]
 Times = Annotated[list[Time], Field(fail_fast=True)]
 Matrix = Annotated[list[Vector], Field(fail_fast=True)]
@@ -141,7 +143,7 @@ class MotionBody(Body):
     wrap: Flags | None = Field(
         None, description="Which joints turn without end, one for all or D: waypoints are reached by the shortest turn"
     )
-    joint_names: list[Text] | None = Field(None, description="D names, used by the ROS 2 and CSV formats")
+    joint_names: Names | None = Field(None, description="D names, used by the ROS 2 and CSV formats")
     sampling: SamplingBody | None = Field(None, description="Where to sample the answer; by default 200 samples")
     include: Annotated[list[Included], Field(max_length=16)] | None = Field(
         None, description="What the answer holds besides the certificate; by default the samples"
@@ -259,7 +261,7 @@ class MotionTrajectoryBody(Body):
     polynomial: PolynomialBody | None = Field(None, description="A piecewise polynomial; its path is followed exactly")
     samples: SamplesBody | None = Field(None, description="Samples; the path passes all of them, or near to them")
     header: HeaderBody | None = Field(None, description="Of a ROS 2 JointTrajectory")
-    joint_names: list[Text] | None = Field(None, description="Of a ROS 2 JointTrajectory: D names, used in the answer")
+    joint_names: Names | None = Field(None, description="Of a ROS 2 JointTrajectory: D names, used in the answer")
     points: Annotated[list[PointBody], Field(fail_fast=True)] | None = Field(
         None, description="Of a ROS 2 JointTrajectory: its M points"
     )
@@ -274,7 +276,7 @@ class RetimeBody(Body):
         None, description="Samples are smoothed: how far the path may be from each, in every joint; without: not at all"
     )
     duration: DurationBody | None = Field(None, description="Bounds of the duration, s")
-    joint_names: list[Text] | None = Field(None, description="D names, used by the ROS 2 and CSV formats")
+    joint_names: Names | None = Field(None, description="D names, used by the ROS 2 and CSV formats")
     sampling: SamplingBody | None = Field(None, description="Where to sample the answer; by default 200 samples")
     include: Annotated[list[Included], Field(max_length=16)] | None = Field(
         None, description="What the answer holds besides the certificate; by default the samples"

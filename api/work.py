@@ -1,36 +1,31 @@
-"""What the service does with a body, without HTTP: the routes and the command line both call this."""
+"""What the service does with a body, without HTTP: the service's solvers and the command line both call this."""
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from planner import METHODS, InvalidRequest, Plan, PlannerError, Row, Sampling, compare, plan, retime, sample
+from planner import METHODS, InvalidRequest, Plan, PlannerError, Row, Sampling, compare, plan, retime, sample_times
 
-from . import encode
-from .reading import included, refuse_count, sampling_of, timeout_of, to_request
+from . import trees
+from .draft import WHOLE, Draft, Drawn, refuse_infinite
+from .formats import FORMATS
+from .media import JSON
+from .reading import asked, included, refuse_count, sampling_of, timeout_of, to_request
 from .retiming import own_fields, read_motion
 from .schemas import CompareBody, MethodChoice, PlanBody, RetimeBody
 from .settings import Caps
-
-#: Fields that the digest states in their canonical form instead.
-_CANONICAL = {"waypoints", "method", "options", "sampling", "include"}
 
 #: Makes the problem document of a row that refuses.
 ProblemOf = Callable[[PlannerError], dict[str, Any]]
 
 
-@dataclass(frozen=True)
-class Answer:
-    """An encoded answer, its media type, and the seconds spent on each stretch of the road to it."""
+def draft_plan(body: PlanBody, caps: Caps, media_type: str = JSON, spent: float = 0.0) -> Draft:
+    """Plan, up to the samples, which are drawn as they are written.
 
-    content: bytes
-    media_type: str
-    seconds: Mapping[str, float]
-
-
-def answer_plan(body: PlanBody, caps: Caps, media_type: str = encode.JSON) -> Answer:
-    """Plan, sample and encode.
+    Parameters
+    ----------
+    spent : float
+        Seconds of the request's time limit that have gone by.
 
     Raises
     ------
@@ -39,15 +34,15 @@ def answer_plan(body: PlanBody, caps: Caps, media_type: str = encode.JSON) -> An
     """
     started = time.perf_counter()
     include, method = _included(body, media_type), body.method or "auto"
-    request, sampling = to_request(body, caps)
+    request, sampling = to_request(body, caps, spent=spent)
     read = time.perf_counter()
     made = plan(request, method, body.options or {})
-    given = body.model_dump(exclude=_CANONICAL, exclude_none=True)
-    return _answer(made, method, sampling, include, given, caps, media_type, read - started)
+    given = asked(body) if body.timeout is None else {**asked(body), "timeout": body.timeout}
+    return _draft(made, method, sampling, include, given, caps, read - started)
 
 
-def answer_retiming(body: RetimeBody, caps: Caps, media_type: str = encode.JSON) -> Answer:
-    """Retime, sample and encode.
+def draft_retiming(body: RetimeBody, caps: Caps, media_type: str = JSON, spent: float = 0.0) -> Draft:
+    """Retime, up to the samples.
 
     Raises
     ------
@@ -55,7 +50,7 @@ def answer_retiming(body: RetimeBody, caps: Caps, media_type: str = encode.JSON)
         As for a plan.
     """
     started = time.perf_counter()
-    include, timeout = _included(body, media_type), timeout_of(body, caps)
+    include, timeout = _included(body, media_type), timeout_of(body, caps, spent)
     motion, names, dims = read_motion(body, caps)
     sampling = sampling_of(body)
     duration = None if body.duration is None else body.duration.model_dump(exclude_none=True)
@@ -74,46 +69,48 @@ def answer_retiming(body: RetimeBody, caps: Caps, media_type: str = encode.JSON)
             bound="bound" in include,
         )
     given = body.model_dump(exclude={"sampling", "include"}, exclude_none=True)
-    return _answer(made, "retiming", sampling, include, given, caps, media_type, read - started)
+    return _draft(made, "retiming", sampling, include, given, caps, read - started)
 
 
 def _included(body: PlanBody | RetimeBody, media_type: str) -> tuple[str, ...]:
     include = included(body)
-    if media_type != encode.JSON and "samples" not in include:
+    if FORMATS[media_type].samples and "samples" not in include:
         raise InvalidRequest.of("/include", "conflict", f"{media_type} holds samples, which are not included")
     return include
 
 
-def _answer(
+def _draft(
     made: Plan,
     method: str,
     sampling: Sampling,
     include: tuple[str, ...],
     given: Mapping[str, Any],
     caps: Caps,
-    media_type: str,
     reading: float,
-) -> Answer:
-    """Sample and encode; ``method`` and ``given`` are what was asked, ``reading`` the seconds before planning."""
+) -> Draft:
+    """Return the draft; ``method`` and ``given`` are what was asked, ``reading`` the seconds before planning."""
     planned = time.perf_counter()
-    samples = sample(made.trajectory, sampling, caps.samples) if "samples" in include else None
-    if samples is not None and media_type != encode.JSON:
-        encode.refuse_infinite(made.method, *encode.samples_tree(samples).values())
-        names = made.request.joint_names
-        content = (
-            encode.to_csv(samples, names)
-            if media_type == encode.CSV
-            else encode.to_ros2(samples, names, made.trajectory.start)
-        )
-    else:
-        digest = encode.digest_of(made, method, sampling, include, given)
-        content = encode.dumps(encode.plan_tree(made, samples, "polynomial" in include, digest))
+    samples = _drawn(made, sampling, caps.samples) if "samples" in include else None
+    digest = trees.digest_of(made, method, sampling, include, given)
+    tree = trees.plan_tree(made, samples, "polynomial" in include, digest)
     seconds = {**made.seconds, "encode": time.perf_counter() - planned}
     seconds["validate"] = seconds.get("validate", 0.0) + reading
-    return Answer(content, media_type, seconds)
+    n, dims = made.request.waypoints.shape
+    draft = Draft(tree, seconds, made.method, n, dims, made.request.joint_names, made.trajectory.start)
+    if samples is not None and samples.numbers <= WHOLE < draft.numbers:  # pieces leave before these are drawn
+        samples.check()
+    return draft
 
 
-def comparison(body: CompareBody, caps: Caps, problem: ProblemOf) -> dict[str, Any]:
+def _drawn(made: Plan, sampling: Sampling, most: int) -> Drawn:
+    """Return the samples; those of a large answer are checked here, since their first piece leaves before the last."""
+    drawn = Drawn(made.trajectory, sample_times(made.trajectory, sampling, most), made.method)
+    if drawn.numbers > WHOLE:
+        drawn.check()
+    return drawn
+
+
+def comparison(body: CompareBody, caps: Caps, problem: ProblemOf, spent: float = 0.0) -> dict[str, Any]:
     """Return one row per method, in the given order; a method that refuses is a row with its problem document.
 
     Raises
@@ -123,7 +120,7 @@ def comparison(body: CompareBody, caps: Caps, problem: ProblemOf) -> dict[str, A
     """
     methods = body.methods if isinstance(body.methods, str) else [_entry(m) for m in body.methods]
     share = len(METHODS) if isinstance(methods, str) else len(methods)
-    request, sampling = to_request(body, caps, share)
+    request, sampling = to_request(body, caps, share, spent)
     rows = compare(request, methods)
     include = included(body)
     return {"rows": [_row(row, include, sampling, caps.samples // share, problem) for row in rows]}
@@ -143,15 +140,16 @@ def _row(row: Row, include: tuple[str, ...], sampling: Sampling, most: int, prob
             "ok": True,
             "duration": made.trajectory.duration,
             "cost": dict(made.certificate.cost),
-            "peaks": encode.peaks_tree(made.certificate),
-            "certificate": encode.certificate_tree(made.certificate),
+            "peaks": trees.peaks_tree(made.certificate),
+            "certificate": trees.certificate_tree(made.certificate),
         }
         if "samples" in include:
-            tree["samples"] = encode.samples_tree(sample(made.trajectory, sampling, most))
+            tree["samples"] = _drawn(made, sampling, most)
+            if tree["samples"].numbers <= WHOLE:
+                tree["samples"].check()
         if "polynomial" in include:
-            tree["polynomial"] = encode.polynomial_tree(made.trajectory)
-        arrays = [*tree.get("samples", {}).values(), *tree.get("polynomial", {}).values()]
-        encode.refuse_infinite(row.method, *arrays)
+            tree["polynomial"] = trees.polynomial_tree(made.trajectory)
+        refuse_infinite(row.method, *tree.get("polynomial", {}).values())
     except PlannerError as error:
         nothing = dict.fromkeys(("duration", "cost", "peaks", "certificate"))
         tree = {"method": row.method, "ok": False, **nothing, "error": problem(error)}

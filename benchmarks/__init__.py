@@ -2,6 +2,6 @@
 
 Four parts: ``cases`` (the problems), ``adapters`` (one file a peer), ``rows`` (measure and judge), ``report`` (CSV and
 Markdown); ``kernels`` and ``curves`` measure sampling, extrema, verdicts and the making of curves by themselves (what a
-measure is: ``figures``), ``minimum_jerk`` and ``path_timing`` are comparisons of their own with splines and solvers,
-``service`` splits the time of a request. Run with ``make bench`` or ``python -m benchmarks``.
+measure is: ``figures``), ``minimum_jerk``, ``path_timing`` and ``waypoints`` are comparisons of their own with splines
+and solvers, ``service`` splits the time of a request. Run with ``make bench`` or ``python -m benchmarks``.
 """

@@ -12,7 +12,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, write CSV and report, and say where they are."""
-    from . import kernels, minimum_jerk, path_timing, report, rows, service
+    from . import kernels, minimum_jerk, path_timing, report, rows, service, waypoints
     from .cases import problems
 
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Our methods beside their peers.")
@@ -33,8 +33,11 @@ def main(arguments: list[str] | None = None) -> int:
     standings = minimum_jerk.measure(asked.quick, asked.only)
     print("path timing", file=sys.stderr, flush=True)
     timings = path_timing.measure(asked.quick, asked.only)
-    splits = service.measure(3 if asked.quick else 30)
-    print(report.write(measured, figures, standings, timings, splits, asked.out))
+    print("through waypoints", file=sys.stderr, flush=True)
+    motions = waypoints.measure(asked.quick, asked.only)
+    print("the service", file=sys.stderr, flush=True)
+    served = service.measure(asked.quick)
+    print(report.write(measured, figures, standings, timings, motions, served, asked.out))
     return 0
 
 

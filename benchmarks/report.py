@@ -22,7 +22,10 @@ from .minimum_jerk.tables import section
 from .path_timing import Timing
 from .path_timing.tables import section as path_timing
 from .rows import Row
-from .service import PARTS, Split
+from .service import Served
+from .service.tables import sections
+from .waypoints import Line
+from .waypoints.tables import section as waypoints
 
 PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig", "spline-trajectory", "copp-py")
 PACKAGES += ("qpsolvers", "piqp", "clarabel", "osqp", "daqp")
@@ -31,7 +34,7 @@ INTRODUCTION = """# Benchmarks
 
 Our methods beside the documented calls of toppra (its quick start), ruckig (offline: one calculation a segment, from
 rest to rest) and scipy, on the same problems; minimum jerk also beside spline-trajectory, IPOPT and solvers of
-quadratic programs; laws along a path also beside copp-py and IPOPT. Made by `make bench`.
+quadratic programs; laws along a path and motions through waypoints also beside copp-py and IPOPT. Made by `make bench`.
 
 - **Certified**: the answer keeps everything asked (limits, waypoints, rest at the ends) to 1e-6 relative, judged by our
   verification at the exact extrema of the pieces. A peer's answer is taken over piece by piece, not sampled. A peer
@@ -62,7 +65,8 @@ def write(
     figures: Sequence[Figure],
     standings: Sequence[Standing],
     timings: Sequence[Timing],
-    splits: Sequence[Split],
+    motions: Sequence[Line],
+    served: Served,
     out: Path,
 ) -> Path:
     """Write the tables as CSV files, the picture of growth and ``report.md`` to a folder; return the report's path."""
@@ -71,10 +75,13 @@ def write(
     _csv(out / "kernels.csv", [{**asdict(f), "each_ns": f.each_ns, "met": f.met} for f in figures])
     _csv(out / "minimum_jerk.csv", [{**asdict(s), "each_ns": s.each_ns, "met": s.met} for s in standings])
     _csv(out / "path_timing.csv", [{**asdict(t), "met": t.met} for t in timings])
-    _csv(out / "service.csv", [{**asdict(s), "rest": s.rest} for s in splits])
+    _csv(out / "waypoints.csv", [{**asdict(m), "over_stops": m.over_stops, "met": m.met} for m in motions])
+    _csv(out / "service.csv", [{**asdict(s), "rest": s.rest} for s in served.splits])
+    _csv(out / "service_costs.csv", [{**asdict(c), "ratio": c.ratio} for c in served.costs])
+    _csv(out / "page.csv", [asdict(s) for s in served.shown])
     draw(standings, out)
     report = out / "report.md"
-    report.write_text(markdown(rows, figures, standings, timings, splits), encoding="utf-8")
+    report.write_text(markdown(rows, figures, standings, timings, motions, served), encoding="utf-8")
     return report
 
 
@@ -83,7 +90,8 @@ def markdown(
     figures: Sequence[Figure],
     standings: Sequence[Standing],
     timings: Sequence[Timing],
-    splits: Sequence[Split],
+    motions: Sequence[Line],
+    served: Served,
 ) -> str:
     """Return the report."""
     parts = [INTRODUCTION, machine(), "## Summary\n", SUMMARY, summary(rows)]
@@ -97,9 +105,9 @@ def markdown(
         parts += [section(standings)]
     if timings:
         parts += [path_timing(timings)]
-    if splits:
-        parts += ["## Where a request's time goes\n", _service(splits)]
-    return "\n".join(parts)
+    if motions:
+        parts += [waypoints(motions)]
+    return "\n".join([*parts, *sections(served)])
 
 
 def machine() -> str:
@@ -176,15 +184,6 @@ def _kernels(figures: Sequence[Figure]) -> str:
     ]
     heads = "call,what,ours ms,peer,peer ms,ratio,goal,met,ns an item,growth,difference".split(",")
     return table(heads, lines)
-
-
-def _service(splits: Sequence[Split]) -> str:
-    lines = []
-    for s in splits:
-        shares = (f"{100 * getattr(s, part) / s.total:.0f} %" for part in (*PARTS, "rest"))
-        lines.append([s.request, s.method, f"{s.total:.2f}", *shares])
-    intro = "In process, without a network; *rest* is reading the body, routing and the test's own client.\n\n"
-    return intro + table(["request", "method", "total ms", *PARTS, "rest"], lines)
 
 
 def _value(row: Row) -> Any:

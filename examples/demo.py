@@ -22,7 +22,7 @@ from api import Client
 
 HERE = Path(__file__).parent
 BUILD = HERE.parent / "build"
-PATIENCE = 180.0  # s; the first start compiles the numerical kernels
+PATIENCE = 180.0  # s; kernels that make demo has not compiled before are compiled first
 
 QUANTITIES = ("velocity", "acceleration", "jerk")
 UNITS = {"position": "rad", "velocity": "rad/s", "acceleration": "rad/s²", "jerk": "rad/s³"}
@@ -119,11 +119,11 @@ def row(rows: Sequence[Row], method: str) -> Row:
 def table(rows: Sequence[Row], limits: Mapping[str, float]) -> str:
     """Return a comparison as text: a line a method, with its figures or the reason why it refuses."""
     heads = ("method", "duration s", *QUANTITIES, "squared jerk", "ms", "certified")
-    form = "{:<16}  {:>10}  {:>8}  {:>12}  {:>8}  {:>12}  {:>8}  {:>9}".format
-    lines = [form(*heads), form(*("-" * n for n in (16, 10, 8, 12, 8, 12, 8, 9)))]
+    form = "{:<22}  {:>10}  {:>8}  {:>12}  {:>8}  {:>12}  {:>8}  {:>9}".format
+    lines = [form(*heads), form(*("-" * n for n in (22, 10, 8, 12, 8, 12, 8, 9)))]
     for r in rows:
         if not r["ok"]:
-            lines.append(f"{r['method']:<16}  refuses: {first_sentence(r['error']['detail'])}")
+            lines.append(f"{r['method']:<22}  refuses: {first_sentence(r['error']['detail'])}")
             continue
         peaks = (ratio(r["peaks"][q], limits[q]) for q in QUANTITIES)
         cost = r["cost"]["squared_jerk"]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # the same names once more, for type checkers; a test holds b
     from .certification import certify as certify
     from .comparison import Row as Row
     from .comparison import compare as compare
+    from .compat import from_ruckig as from_ruckig
     from .errors import ERRORS as ERRORS
     from .errors import FieldError as FieldError
     from .errors import Infeasible as Infeasible
@@ -45,6 +46,7 @@ if TYPE_CHECKING:  # the same names once more, for type checkers; a test holds b
     from .sampling import Samples as Samples
     from .sampling import sample as sample
     from .sampling import sample_count as sample_count
+    from .sampling import sample_times as sample_times
     from .smoothing.stream import Stream as Stream
     from .trajectory import Trajectory as Trajectory
     from .types import Certificate as Certificate
@@ -60,6 +62,7 @@ _HOME = {
     "catalogue": ("describe_method", "list_methods"),
     "certification": ("Recorded", "certify"),
     "comparison": ("Row", "compare"),
+    "compat": ("from_ruckig",),
     "errors": (
         "ERRORS",
         "FieldError",
@@ -79,7 +82,7 @@ _HOME = {
     "options": ("MAX_TIME", "MAX_VALUE", "Options", "invalid", "pointer"),
     "planning": ("Plan", "pick", "plan"),
     "retiming": ("retime",),
-    "sampling": ("Samples", "sample", "sample_count"),
+    "sampling": ("Samples", "sample", "sample_count", "sample_times"),
     "smoothing.stream": ("Stream",),
     "trajectory": ("Trajectory",),
     "types": ("Certificate", "Check", "Note", "Objective", "PlanRequest", "Sampling"),

@@ -42,8 +42,7 @@ def objective(
     low = None if bound is None else bound.evidence.lower_bound()
     if bound is None or low is None or not low <= value * (1.0 + BEYOND):  # one above the value is disproved by it
         return Objective(minimised.name, value, None, None, None, kkt)
-    if abs(value - low) <= 1e-12 * abs(value):  # equal but for rounding
-        low = min(low, value)
+    low = min(low, value)  # above by no more than what limits are kept to
     gap = value / low - 1.0 if low > 0 else value - low
     return Objective(minimised.name, value, low, gap, bound.scope, kkt)
 

@@ -107,6 +107,40 @@ CASES: dict[str, Case] = {
             {"waypoints": PICK_AND_PLACE, "limits": UR5E},
         ),
         Case(
+            "ur5e_via_points",
+            "UR5e pick and place through its waypoints without a stop but at the two parts, as fast as limits allow",
+            {
+                "waypoints": PICK_AND_PLACE,
+                "limits": UR5E,
+                "waypoint_states": [
+                    None,
+                    None,
+                    {"velocity": [0.0] * 6},
+                    None,
+                    None,
+                    None,
+                    {"velocity": [0.0] * 6},
+                    None,
+                ],
+                "method": "time_optimal_waypoints",
+            },
+        ),
+        Case(
+            "gantry_in_its_frame",
+            "A gantry through waypoints within the range of its axes, with more time for one of the ways",
+            {
+                "waypoints": [[0.02, 0.02], [0.5, 0.38], [0.98, 0.2], [0.6, 0.02], [0.1, 0.3], [0.02, 0.02]],
+                "limits": {
+                    "position": {"lower": -0.2, "upper": [1.2, 0.6]},
+                    "velocity": 1.0,
+                    "acceleration": 4.0,
+                    "jerk": 40.0,
+                },
+                "segment_durations": [None, None, {"min": 1.2}, None, None],
+                "method": "time_optimal_waypoints",
+            },
+        ),
+        Case(
             "ur5e_times_limits",
             "UR5e pick and place at given times that are short for its limits: acceleration and jerk reach them",
             {

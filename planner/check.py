@@ -1,7 +1,7 @@
 """The first stretch of the road: is the request complete, does the method honour it, what exactly is it held to."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from .limits import Boundary, WaypointStates
 from .method import Capabilities, Method
 from .options import Options
 from .paths import PathOptions
-from .types import MIN_STEP, Demands, Note, PlanRequest
+from .types import MIN_STEP, NO_STATE, Demands, Note, PlanRequest, altered
 
 Array = NDArray[np.float64]
 
@@ -69,10 +69,10 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         turned = shortest_turns(request.waypoints, request.wrap)
         if (turned != request.waypoints).any():
             notes.append(Note("turns_added", "waypoints of joints that wrap were moved by whole turns to the nearest"))
-        request = original = replace(request, waypoints=turned)
-    extent = float(np.ptp(request.waypoints, axis=0).max())
+        request = original = altered(request, waypoints=turned)
+    extent = float((request.waypoints.max(axis=0) - request.waypoints.min(axis=0)).max())
     if 0 < extent < TINY:
-        request = replace(request, waypoints=np.broadcast_to(request.waypoints[0], request.waypoints.shape).copy())
+        request = altered(request, waypoints=np.broadcast_to(request.waypoints[0], request.waypoints.shape).copy())
         extent = 0.0
         notes.append(Note("moves_snapped", f"all waypoints lie within {TINY:g} of one another and were made equal"))
     if request.times is None and not options.control_points and not options.fixes_knots:
@@ -83,7 +83,8 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     else:
         kept = np.arange(request.count)
     start, end = (_resolved(request, can, side) for side in ("start", "end"))
-    moving = _moving(start) or _moving(end)
+    given = request.start.given() or request.end.given() or request.waypoint_states is not None
+    moving = bool(given) and (_moving(start) or _moving(end))
     still = not extent and not moving
     still = still and not options.moves_by_itself and not _moving_waypoints(request.waypoint_states)
     if still and options.model_fields_set:
@@ -91,11 +92,12 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
     if request.times is None and can.timing == "given":
         assert request.duration is not None  # _require saw to it
         if not still:
-            request = replace(request, times=_spread(request, spacing))
+            request = altered(request, times=_spread(request, spacing))
             how = {"centripetal": "centripetally", "chord_length": "by chord length", "uniform": "uniformly"}[spacing]
             notes.append(Note("times_chosen", f"no times were given: spread {how} over the duration"))
-    request = replace(request, start=start, end=end)
-    timed = can.timing == "given" and request.times is not None
+    request = altered(request, start=start, end=end)
+    times = request.times if can.timing == "given" else None
+    timed = times is not None
     if timed or moving or _bounded_or_asked(request):
         refuse_hopeless(request, not options.control_points, timed)
     rounding = None if options.rounding is None else np.full(request.dims, options.rounding)
@@ -103,7 +105,7 @@ def check(request: PlanRequest, method: Method, options: Options, methods: Itera
         dims=request.dims,
         limits=request.limits,
         waypoints=None if options.control_points else original.waypoints,
-        times=request.times[kept] if timed and request.times is not None else None,
+        times=times if times is None or request.count == len(kept) else times[kept],
         segment_limits=original.segment_limits,
         segment_durations=original.segment_durations,
         duration=request.duration,
@@ -171,16 +173,9 @@ def _require(request: PlanRequest, can: Capabilities) -> None:
     duration = request.duration
     if "times" in can.requires and request.times is None and not (duration is not None and duration.exact):
         raise InvalidRequest.of("/times", "missing", "the method needs times (or a duration with min equal to max)")
-    moving = request.waypoints.min(axis=0) < request.waypoints.max(axis=0)
-    for side in (request.start, request.end):
-        for name in side.given():
-            moving |= getattr(side, name) != 0
-    if request.waypoint_states is not None:
-        for name in _STATES:
-            moving |= (np.nan_to_num(getattr(request.waypoint_states, name)) != 0).any(axis=0)
-    for quantity in ("velocity", "acceleration", "jerk"):
-        if quantity not in can.requires:
-            continue
+    needed = [name for name in ("velocity", "acceleration", "jerk") if name in can.requires]
+    moving = _moving_joints(request) if needed else np.empty(0)
+    for quantity in needed:
         limit = getattr(request.limits, quantity)
         if limit is None:
             raise InvalidRequest.of(
@@ -201,6 +196,17 @@ def _require(request: PlanRequest, can: Capabilities) -> None:
         step = float(request.times[i + 1] - request.times[i])
         if can.timing == "given" and bounds is not None and not _within(step, bounds.min, bounds.max):
             raise InvalidRequest.of(f"/segment_durations/{i}", "conflict", f"the times give the segment {step:g} s")
+
+
+def _moving_joints(request: PlanRequest) -> NDArray[np.bool_]:
+    moving = request.waypoints.min(axis=0) < request.waypoints.max(axis=0)
+    for side in (request.start, request.end):
+        for name in side.given():
+            moving |= getattr(side, name) != 0
+    if request.waypoint_states is not None:
+        for name in _STATES:
+            moving |= (np.nan_to_num(getattr(request.waypoint_states, name)) != 0).any(axis=0)
+    return np.asarray(moving)
 
 
 def _spread(request: PlanRequest, spacing: Spacing) -> Array:
@@ -260,7 +266,7 @@ def _merged(request: PlanRequest, extent: float) -> tuple[PlanRequest, NDArray[n
 
     if keep.all():
         return request, kept
-    return replace(
+    return altered(
         request,
         waypoints=points[keep],
         segment_limits=shorter(request.segment_limits),
@@ -301,6 +307,8 @@ def _resolved(request: PlanRequest, can: Capabilities, side: str) -> Boundary:
     """
     given: Boundary = getattr(request, side)
     names, states = getattr(can, side) | can.rests, _end_states(request, side)
+    if not states and not given.given() and not can.with_jerk:  # as is usual
+        return Boundary(**dict.fromkeys(names, np.zeros(request.dims))) if names else NO_STATE
     moving = given.velocity is not None and bool(given.velocity.any())
     values = {}
     for name in names | states.keys():
@@ -347,4 +355,4 @@ def _jerk_limited(request: PlanRequest) -> NDArray[np.bool_]:
 
 def _moving(state: Boundary) -> bool:
     values = (getattr(state, name) for name in state.given())
-    return any(((x != 0) & ~np.isnan(x)).any() for x in values)
+    return any((np.abs(x) > 0).any() for x in values)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import Infeasible, InvalidRequest
-from .limits import QUANTITIES, magnitude, norm_bounds, segment_bounds
+from .limits import QUANTITIES, is_limited, magnitude, norm_bounds, segment_bounds
 from .types import PlanRequest
 
 Array = NDArray[np.float64]
@@ -41,10 +41,17 @@ def refuse_hopeless(request: PlanRequest, passed: bool, timed: bool) -> None:
         Certified: a waypoint (with its tolerance and the tube), a state asked at an end or a waypoint, or the mean
         velocity of a segment breaks a limit.
     """
-    if passed:
+
+    def limited(name: str) -> bool:
+        return is_limited(request.limits, request.segment_limits, name)
+
+    if passed and limited("position"):
         told = "a waypoint" if request.waypoint_tolerance is None else "a waypoint, tolerance included,"
         _refuse_beyond(request, 0, _either_side(_nearest_positions(request)), told)
+    norm = limited("velocity_norm")
     for order, name in enumerate(QUANTITIES[1:], 1):
+        if not limited(name) and not (norm and order == 1):
+            continue
         states = np.full((2, request.count, request.dims), np.nan)  # asked at the waypoints, and at the ends
         if request.waypoint_states is not None and order < 3:
             states[0] = getattr(request.waypoint_states, name)
@@ -54,10 +61,10 @@ def refuse_hopeless(request: PlanRequest, passed: bool, timed: bool) -> None:
         for told, values in (("the state asked at a waypoint", states[0]), ("the state asked at an end", states[1])):
             if not np.isnan(values).all():
                 _refuse_beyond(request, order, _either_side(values), told)
-                if order == 1:  # joints that are free can only add to the norm
+                if order == 1 and norm:  # joints that are free can only add to the norm
                     norms = np.sqrt(np.nansum(_either_side(values) ** 2, axis=-1))
                     _refuse_norm(request, norms, told)
-    if timed and passed:
+    if timed and passed and (norm or limited("velocity")):
         _refuse_mean_velocity(request)
 
 

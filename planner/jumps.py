@@ -23,18 +23,22 @@ class Jumps:
     trajectory : Trajectory
     span : float
         What errors of positions are relative to.
+    ends : (R, 2, K, D)
+        The derivatives of order 0 … R - 1 at the ends of the pieces, where they are known.
     """
 
-    def __init__(self, trajectory: Trajectory, span: float = 1.0) -> None:
+    def __init__(self, trajectory: Trajectory, span: float = 1.0, ends: Array | None = None) -> None:
         self._trajectory, self._span = trajectory, span
-        self._ends: list[Array] = []
+        self._ends: list[Array] = [] if ends is None else list(ends)
 
     def ends(self, order: int) -> Array:
         """Return the derivative at the left and at the right end of every piece, (2, K, D)."""
         known = len(self._ends)
         if order >= known:
-            found = self._trajectory.all_ends(known, max(order + 1, 4))
-            self._ends += [found[:, m] for m in range(found.shape[1])]
+            curve, last = self._trajectory, max(order + 1, 4)
+            if not curve.rational:  # a few more cost less than asking again
+                last = max(last, min(2 * order, curve.degree + 2))
+            self._ends.extend(curve.all_ends(known, last))
         return self._ends[order]
 
     def judged(self, order: int, peak: Array) -> tuple[NDArray[np.bool_], bool]:
@@ -57,7 +61,7 @@ class Jumps:
         trajectory, c = self._trajectory, self._trajectory.coefficients
         if trajectory.weights is not None:  # where the denominator is small, so is what rounding is relative to
             c = c / np.minimum(trajectory.weights[-1], trajectory.weights.sum(axis=0))[:, None]
-        near = (np.ascontiguousarray(self.ends(m)) for m in (order, order + 1, 0))
+        near = (self.ends(m) for m in (order, order + 1, 0))
         h = np.diff(trajectory.breaks)
         return counted, bool(judge(c, trajectory.breaks, h, order, *near, peak, JUMP, GROWTH, counted))
 

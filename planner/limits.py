@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -105,18 +106,34 @@ class Limits:
 
     def given(self) -> tuple[str, ...]:
         """Return the names of the limits that are there."""
-        return tuple(f.name for f in fields(self) if getattr(self, f.name) is not None)
+        return tuple(name for name, value in vars(self).items() if value is not None)
 
     def bounds(self, order: int, dims: int) -> Limit:
         """Return the limit of the derivative of the given order, infinite where there is none."""
         limit = getattr(self, QUANTITIES[order])
-        return limit if limit is not None else Limit(np.full(dims, -np.inf), np.full(dims, np.inf))
+        return limit if limit is not None else _unlimited(dims)
+
+
+@cache
+def _unlimited(dims: int) -> Limit:
+    limit = Limit(np.full(dims, -np.inf), np.full(dims, np.inf))
+    for array in (limit.lower, limit.upper):  # shared by all that ask
+        array.setflags(write=False)
+    return limit
+
+
+def is_limited(whole: Limits, segments: Sequence[Limits | None] | None, name: str) -> bool:
+    """Return whether a request or one of its segments limits that quantity."""
+    return getattr(whole, name) is not None or any(
+        own is not None and getattr(own, name) is not None for own in segments or ()
+    )
 
 
 def segment_bounds(whole: Limits, segments: Sequence[Limits | None] | None, order: int, count: int, dims: int) -> Limit:
     """Return the bounds of a derivative on every segment, each side (count, D): of request and segment, the tighter."""
     limit = whole.bounds(order, dims)
-    lower, upper = np.tile(limit.lower, (count, 1)), np.tile(limit.upper, (count, 1))
+    lower, upper = np.empty((count, dims)), np.empty((count, dims))
+    lower[:], upper[:] = limit.lower, limit.upper
     for i, own in enumerate(segments or ()):
         if own is not None:
             here = own.bounds(order, dims)
@@ -189,7 +206,7 @@ class Boundary:
 
     def given(self) -> tuple[str, ...]:
         """Return the names of the derivatives that are pinned."""
-        return tuple(f.name for f in fields(self) if getattr(self, f.name) is not None)
+        return tuple(name for name, value in vars(self).items() if value is not None)
 
 
 @dataclass(frozen=True, eq=False)

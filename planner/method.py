@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import Any, Literal
 
 from .options import CAPABILITIES, Options
@@ -44,13 +45,14 @@ class Capabilities:
         if unknown or not self.requires <= self.honours:
             raise ValueError(f"requires must be part of honours, and both of CAPABILITIES: {sorted(unknown)}")
 
-    @property
+    @cached_property
     def words(self) -> tuple[str, ...]:
         """Everything honoured, boundary states included, in the order of ``CAPABILITIES``."""
         boundary = {f"boundary_{name}" for name in self.start | self.end}
         return tuple(w for w in CAPABILITIES if w in self.honours | boundary)
 
 
+@cache
 def at_given_times(
     continuity: int, start: frozenset[str] = frozenset(), end: frozenset[str] = frozenset()
 ) -> Capabilities:
@@ -59,6 +61,7 @@ def at_given_times(
     return Capabilities("given", continuity, frozenset({"times"}), honours, start=start, end=end)
 
 
+@cache
 def by_control_points(continuity: int) -> Capabilities:
     """Return what a curve by control points honours: its clock is a parameter, whose span may be asked."""
     return Capabilities("parameter", continuity, honours=frozenset({"duration"}))

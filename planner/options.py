@@ -1,5 +1,6 @@
 """The base of every method's options, and the words in which methods say what they honour."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -133,10 +134,17 @@ def read_options(model: type[Options], given: Options | dict[str, Any] | None) -
         return given
     if isinstance(given, Options):
         return _wrong(model, given)
+    if not given:
+        return _defaults(model)
     try:
-        return model.model_validate(_lists(given or {}))
+        return model.model_validate(_lists(given))
     except ValidationError as error:
         raise invalid(error, ("options",)) from None
+
+
+@cache
+def _defaults(model: type[Options]) -> Options:
+    return model()
 
 
 def _lists(value: Any) -> Any:

@@ -5,7 +5,7 @@ nothing. Bernstein coefficients have the same shape, the first belonging to u = 
 """
 
 from functools import cache
-from math import comb, factorial, perm
+from math import comb, factorial, isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,7 +31,7 @@ def frozen(values: Array) -> Array:
 
 def finite(values: Array) -> bool:
     """Return whether all are finite; their sum costs no memory, but may overflow."""
-    return bool(np.isfinite(values.sum()) or np.isfinite(values).all())
+    return isfinite(values.sum()) or bool(np.isfinite(values).all())
 
 
 def differentiated(c: Array, order: int) -> Array:
@@ -41,23 +41,6 @@ def differentiated(c: Array, order: int) -> Array:
         return np.zeros_like(c[:1])
     factors = [factorial(k) // factorial(k - order) for k in range(n, order - 1, -1)]
     return np.asarray(c[: n + 1 - order] * _along(np.array(factors, dtype=np.float64), c))
-
-
-def at_ends(c: Array, first: int, last: int, scale: Array | float = 1.0) -> Array:
-    """Return ``scale`` times the u-derivatives of order first … last - 1 at u = 0 and at u = 1, (2, R, K, D)."""
-    n, orders = len(c) - 1, last - first
-    out, factors = np.empty((2, orders, *c.shape[1:])), _falling(n, first, last)
-    for m in range(first, last):
-        out[0, m - first] = c[n - m] * factors[m - first, n - m] if m <= n else 0.0
-    np.matmul(factors, c.reshape(n + 1, -1), out=out[1].reshape(orders, -1))
-    out *= scale
-    return out
-
-
-@cache
-def _falling(n: int, first: int, last: int) -> Array:
-    """Return the factors k! / (k - m)! of the powers k = n … 0 in the derivatives of order m, (last - first, n + 1)."""
-    return np.array([[perm(k, m) for k in range(n, -1, -1)] for m in range(first, last)], dtype=np.float64)
 
 
 def raised(c: Array, degree: int) -> Array:

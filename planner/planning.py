@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from .methods import METHODS
 from .options import Options, read_options
 from .timing.stops import segment_durations
 from .trajectory import Trajectory
-from .types import TOLERANCE, Certificate, Note, PlanRequest, Solution, Stats
+from .types import TOLERANCE, Certificate, Note, PlanRequest, Solution, Stats, altered
 from .verify import position_span, verify
 
 Array = NDArray[np.float64]
@@ -65,18 +65,17 @@ def plan(request: PlanRequest, method: str = "auto", options: Options | Mapping[
     checked = time.perf_counter()
     with np.errstate(all="ignore"):  # what overflows does not verify
         solution = hold(asked) if asked.still else _solve(row, asked.request, chosen)
-    solved = time.perf_counter()
-    if request.timeout is not None and solved - started > request.timeout:
-        raise TimeLimit(request.timeout)
-    times = None
-    if solution.waypoint_times is not None and not chosen.control_points:
-        times = solution.waypoint_times[asked.kept]
-    with np.errstate(all="ignore"):
-        certificate = verify(solution.trajectory, asked.demands, times, solution.path)
+        solved = time.perf_counter()
+        if request.timeout is not None and solved - started > request.timeout:
+            raise TimeLimit(request.timeout)
+        times = None if chosen.control_points else solution.waypoint_times
+        if times is not None and len(times) < len(asked.kept):
+            times = times[asked.kept]
+        certificate = verify(solution.trajectory, asked.demands, times, solution.path, solution.polyline)
     if request.timeout is not None and time.perf_counter() - started > request.timeout:
         raise TimeLimit(request.timeout)
     minimised = solution.minimised or row.minimises(chosen) or minimised_by(row.objective)
-    judged = replace(certificate, objective=objective(minimised, solution.trajectory, certificate, solution.bound))
+    judged = altered(certificate, objective=objective(minimised, solution.trajectory, certificate, solution.bound))
     if not certificate.holds:
         if (reason := beyond_precision(solution.trajectory, asked.request.waypoints)) is not None:
             raise Unsupported(row.id, "precision", reason=reason)
@@ -121,8 +120,8 @@ def _solve(row: Method, request: PlanRequest, options: Options) -> Solution:
 def pick(request: PlanRequest, method: str) -> tuple[Method, str | None]:
     """Return the method of that id; for ``auto`` the one that fits the times and limits, and why.
 
-    ``auto``: times -> ``minimum_jerk``; velocity, acceleration and jerk limits -> ``ruckig``; an acceleration limit ->
-    ``time_optimal_path``; otherwise the request must say more.
+    ``auto``: times -> ``minimum_jerk``; velocity, acceleration and jerk limits -> ``time_optimal_waypoints``; an
+    acceleration limit -> ``time_optimal_path``; otherwise the request must say more.
     """
     if method != "auto":
         if method not in METHODS:
@@ -132,7 +131,7 @@ def pick(request: PlanRequest, method: str) -> tuple[Method, str | None]:
     if request.times is not None:
         return METHODS["minimum_jerk"], "times were given"
     if limits.jerk is not None and limits.velocity is not None and limits.acceleration is not None:
-        return METHODS["ruckig"], "no times, but velocity, acceleration and jerk limits were given"
+        return METHODS["time_optimal_waypoints"], "no times, but velocity, acceleration and jerk limits were given"
     if limits.acceleration is not None:
         return METHODS["time_optimal_path"], "no times, but an acceleration limit was given"
     raise InvalidRequest.of("/limits/acceleration", "missing", "give times, or at least limits on acceleration")

@@ -17,11 +17,6 @@ LOW = 0.05
 #: Intervals looked at together.
 MOST_PIECES = 1 << 16
 
-#: Of piece numbers (I,) and intervals of u, by left ends and widths, (I,) each: what is found there, (6, I). That is
-#: the mean by the coarse rule and by the fine one; of the values that the fine one looks at the smallest, the smaller
-#: one at an end, and the largest; and by how much rounding lets the mean differ.
-Look = Callable[[NDArray[np.int64], Array, Array], Array]
-
 
 def integral(
     function: Callable[[NDArray[np.int64], Array], Array], pieces: int, noise: Array, most: int = 1 << 18
@@ -38,26 +33,15 @@ def integral(
     most : int
         Intervals looked at in all, or 8 for every piece, before what is found has to do.
     """
-
-    def look(piece: NDArray[np.int64], left: Array, width: Array) -> Array:
-        values = function(piece, left[:, None] + width[:, None] * NODES[:26])
-        fine = values[:, 8:]
-        means = values[:, :8] @ WEIGHTS[:8], fine[:, :16] @ WEIGHTS[8:]
-        return np.stack([*means, fine.min(axis=1), fine[:, 16:].min(axis=1), fine.max(axis=1), noise[piece]])
-
-    return integral_of(look, pieces, most)
-
-
-def integral_of(look: Look, pieces: int, most: int = 1 << 18) -> float:
-    """Return the same integral, of a function that is looked at by intervals."""
     piece, left, width = np.arange(pieces), np.zeros(pieces), np.ones(pieces)
     total, seen = 0.0, 0
     for _ in range(48):
-        found = look(piece, left, width)
-        a, b = found[:2] * width
-        lowest, end, highest, noise = found[2:]
+        values = function(piece, left[:, None] + width[:, None] * NODES[:26])
+        fine = values[:, 8:]
+        a, b = (values[:, :8] @ WEIGHTS[:8]) * width, (fine[:, :16] @ WEIGHTS[8:]) * width
+        lowest, end, highest = fine.min(axis=1), fine[:, 16:].min(axis=1), fine.max(axis=1)
         scale = max(total + float(b.sum()), 1e-300)
-        allowed = np.maximum(1e-11 * scale / np.sqrt(len(a)), noise * width)
+        allowed = np.maximum(1e-11 * scale / np.sqrt(len(a)), noise[piece] * width)
         rough = np.abs(a - b) > allowed
         # it may come down to zero and rise again between the places looked at, unless it rises from a rest at an end
         kink = (lowest < LOW * highest) & (end > 1e-9 * highest)

@@ -53,8 +53,8 @@ def vector(value: Any, field: str, size: int | None = None, largest: float = MAX
 
 
 def matrix(value: Any, field: str, columns: int | None = None, largest: float = MAX_VALUE) -> Array:
-    """Return a matrix of finite numbers; rows must be of equal length. A vector is read as one column."""
-    array = _array(value, field, 2)
+    """Return a matrix of finite numbers, row by row; rows must be of equal length. A vector is read as one column."""
+    array = np.ascontiguousarray(_array(value, field, 2))  # kernels would be compiled anew for another layout
     if columns is not None and array.shape[1] != columns:
         raise InvalidRequest.of(field, "shape_mismatch", f"rows need {columns} entries, have {array.shape[1]}")
     return _bounded(array, field, largest)
@@ -75,7 +75,7 @@ def per_joint(value: Any, field: str, dims: int, missing: float) -> Array:
 
 def increasing(array: Array, field: str) -> Array:
     """Return the vector if its entries increase strictly."""
-    steps = np.diff(array)
+    steps = array[1:] - array[:-1]
     if len(steps) and not (steps > 0).all():
         i = int(np.argmax(steps <= 0)) + 1
         word = "repeats" if steps[i - 1] == 0 else "falls below"
@@ -120,8 +120,8 @@ def _ragged(value: Any, field: str) -> None:
 
 
 def _bounded(array: Array, field: str, largest: float) -> Array:
-    bad = ~(np.abs(array) <= largest)  # also true for NaN
-    if bad.any():
+    if array.size and not np.abs(array).max() <= largest:  # so for NaN, too
+        bad = ~(np.abs(array) <= largest)
         at = tuple(int(i) for i in np.argwhere(bad)[0])
         where = field + "".join(f"/{i}" for i in at)
         if not np.isfinite(array[at]):

@@ -54,8 +54,14 @@ def sample(trajectory: Trajectory, sampling: Sampling, most: int | None = None) 
     InvalidRequest
         A sampling time outside the trajectory (``out_of_range``).
     """
+    times = sample_times(trajectory, sampling, most)
+    return Samples(times, *trajectory.states(times, 4))
+
+
+def sample_times(trajectory: Trajectory, sampling: Sampling, most: int | None = None) -> Array:
+    """Return the times, (M,) in s, at which ``sample`` samples; refuses what it refuses."""
     count = sample_count(sampling, trajectory.duration)
-    refuse_too_many(count, trajectory.dims, most)
+    refuse_too_many(count, trajectory.dims, most, sampling, trajectory.duration)
     start, end = trajectory.start, trajectory.end
     if trajectory.duration == 0.0:
         times = np.array([start, start])
@@ -70,14 +76,34 @@ def sample(trajectory: Trajectory, sampling: Sampling, most: int | None = None) 
         times[-1] = end
     else:
         times = np.linspace(start, end, count, dtype=np.float64)
-    times = np.clip(times, start, end)
-    if trajectory.duration > 0:
+    times = np.minimum(np.maximum(times, start), end)
+    if trajectory.duration > 0 and not (times[1:] > times[:-1]).all():
         times = np.unique(times)  # those that fall on one instant of the clock are one
-    return Samples(times, *trajectory.states(times, 4))
+    return times
 
 
-def refuse_too_many(count: int, dims: int, most: int | None) -> None:
-    """Raise TooLarge if ``count`` samples of ``dims`` joints are over the cap."""
-    if most is not None and count * dims > most:
-        hint = f"{count:,} samples of {dims} joints were asked; take a larger dt, or include polynomial, not samples"
-        raise TooLarge("samples x joints", most, hint)
+def refuse_too_many(
+    count: int, dims: int, most: int | None, sampling: Sampling | None = None, duration: float = 0.0
+) -> None:
+    """Raise TooLarge if ``count`` samples of ``dims`` joints are over the cap; its hint says what would fit.
+
+    Parameters
+    ----------
+    sampling, duration
+        What was asked, and the trajectory's duration in s, or the least that it can have.
+    """
+    if most is None or count * dims <= most:
+        return
+    fitting, fewer = most // dims, "take fewer"
+    if sampling is not None and sampling.dt is not None and fitting >= 2 and duration > 0.0:
+        fewer = f"a motion of {duration:.6g} s fits with a dt of {_rounded_up(duration / (fitting - 1)):g} s or more"
+    elif sampling is not None and sampling.count is not None and fitting >= 2:
+        fewer = f"a count of {fitting:,} fits"
+    hint = f"{count:,} samples of {dims} joints were asked; {fewer}; or ask for the exact pieces instead of samples: "
+    raise TooLarge("samples x joints", most, hint + '"include": ["polynomial"]')
+
+
+def _rounded_up(value: float) -> float:
+    """Return the next number of three digits that is not less."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.ceil(value / unit * (1 + 1e-9)) * unit

@@ -71,7 +71,7 @@ class Trajectory:
         if not (arithmetic.finite(breaks) and arithmetic.finite(coefficients)):
             raise InvalidRequest.of("", "not_finite", "a trajectory's breaks and coefficients must be finite")
         still = len(breaks) == 2 and breaks[0] == breaks[1] and len(coefficients) == 1
-        if not still and not (np.diff(breaks) > SHORTEST).all():
+        if not still and not (breaks[1:] - breaks[:-1]).min() > SHORTEST:
             raise InvalidRequest.of(
                 "", "not_increasing", f"a trajectory's breaks must increase, by {SHORTEST:g} or more"
             )
@@ -131,7 +131,7 @@ class Trajectory:
         from .kernels.hermite import hermite_pieces
 
         out = np.empty((2 * len(states) + 2, len(breaks) - 1, points.shape[1]))
-        hermite_pieces(np.diff(breaks), points, states, out)
+        hermite_pieces(breaks[1:] - breaks[:-1], points, states, out)
         return cls(breaks, arithmetic.frozen(out))
 
     @classmethod
@@ -182,8 +182,8 @@ class Trajectory:
     @cached_property
     def rates(self) -> Array:
         """1 / duration of each piece; 0 for the hold without duration, whose derivatives are zero."""
-        h = np.diff(self.breaks)
-        return np.divide(1.0, h, out=np.zeros_like(h), where=h > 0)
+        h = self.breaks[1:] - self.breaks[:-1]
+        return np.asarray(1.0 / h) if h[0] > 0 else np.zeros_like(h)
 
     @cached_property
     def _homogeneous(self) -> Array:
@@ -265,16 +265,18 @@ class Trajectory:
 
     def ends(self, order: int) -> tuple[Array, Array]:
         """Return the derivative at the left and at the right end of every piece, each (K, D)."""
-        left, right = self.all_ends(order, order + 1)[:, 0]
+        left, right = self.all_ends(order, order + 1)[0]
         return left, right
 
     def all_ends(self, first: int, last: int) -> Array:
-        """Return the derivatives of order first … last - 1 at the left and right ends, (2, last - first, K, D)."""
-        scale = (self.rates ** np.arange(first, last)[:, None])[:, :, None]
+        """Return the derivatives of order first … last - 1 at the left and right ends, (last - first, 2, K, D)."""
+        from .kernels.motion import end_states
+
         if not self.rational:
-            return arithmetic.at_ends(self.coefficients, first, last, scale)
-        both = arithmetic.at_ends(self._homogeneous, 0, last)
-        return np.stack([quotient(x[..., :-1], x[..., -1])[first:] * scale for x in both])
+            return np.asarray(end_states(self.coefficients, self.rates, first, last))
+        both = end_states(self._homogeneous, np.ones(self.pieces), 0, last)
+        scale = self.rates ** np.arange(first, last)[:, None]
+        return quotient(both[..., :-1], both[..., -1])[first:] * scale[:, None, :, None]
 
     def jumps(self, order: int) -> Array:
         """Return the jumps of a derivative at the interior breaks, shape (K - 1, D)."""
@@ -306,11 +308,9 @@ class Trajectory:
             return squared_integral(self._homogeneous, self.rates, order)
         if order > self.degree:
             return 0.0
-        c = arithmetic.differentiated(self.coefficients, order)
-        power = np.arange(len(c) - 1, -1, -1)
-        gram = 1.0 / (power[:, None] + power[None, :] + 1.0)
-        squares = np.einsum("kid,kid->i", c, (gram @ c.reshape(len(c), -1)).reshape(c.shape))
-        return float(np.sum(squares * self.rates ** (2 * order - 1)))
+        from .kernels.motion import squared_integral as integrate
+
+        return float(integrate(self.coefficients, self.rates, order))
 
     # -- changing ----------------------------------------------------------------------------------------------------
 

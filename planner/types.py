@@ -1,8 +1,8 @@
 """What goes in and what comes out: frozen dataclasses over NumPy arrays, checked on creation by their ``of``."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +14,21 @@ from .options import MAX_TIME
 from .trajectory import Trajectory
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
+#: What is shared by all that ask for nothing.
+NO_LIMITS, NO_STATE = Limits(), Boundary()
 #: Shortest time between two waypoints, s; below it derivatives leave the range of floating point.
 MIN_STEP = 1e-9
 #: Largest relative violation of anything asked that may still be called kept.
 TOLERANCE = 1e-6
+
+
+def altered(record: T, **values: Any) -> T:
+    """Return a frozen dataclass with other values: ``dataclasses.replace`` where nothing is derived from them."""
+    made = object.__new__(type(record))
+    vars(made).update(vars(record), **values)
+    return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +70,12 @@ class PlanRequest:
 
     waypoints: Array
     times: Array | None = None
-    limits: Limits = field(default_factory=Limits)
+    limits: Limits = NO_LIMITS
     segment_limits: tuple[Limits | None, ...] | None = None
     segment_durations: tuple[DurationBounds | None, ...] | None = None
     duration: DurationBounds | None = None
-    start: Boundary = field(default_factory=Boundary)
-    end: Boundary = field(default_factory=Boundary)
+    start: Boundary = NO_STATE
+    end: Boundary = NO_STATE
     waypoint_states: WaypointStates | None = None
     waypoint_tolerance: Array | None = None
     tube: Array | None = None
@@ -104,7 +114,7 @@ class PlanRequest:
             With every finding: ``too_few_points``, ``shape_mismatch``, ``not_finite``, ``not_increasing``,
             ``bad_limits``, ``bad_duration``, ``out_of_range``, ``wrong_type``, ``unknown_field``.
         """
-        unknown = sorted(set(given) - {f.name for f in fields(cls)})
+        unknown = sorted(given.keys() - _READERS.keys())
         if unknown:
             raise InvalidRequest([FieldError(f"/{k}", "unknown_field", "there is no such field") for k in unknown])
         points = reading.matrix(waypoints, "/waypoints")
@@ -113,33 +123,17 @@ class PlanRequest:
                 "/waypoints", "too_few_points", "needs at least two waypoints of at least one joint"
             )
         n, dims = points.shape
-        readers: dict[str, Any] = {
-            "times": lambda v: _times(v, n),
-            "limits": lambda v: Limits.of(v, dims),
-            "segment_limits": lambda v: _each(v, n - 1, "/segment_limits", lambda e, f: Limits.of(e, dims, f)),
-            "segment_durations": lambda v: _each(v, n - 1, "/segment_durations", DurationBounds.of),
-            "duration": lambda v: DurationBounds.of(v, "/duration"),
-            "start": lambda v: Boundary.of(v, dims, "/start"),
-            "end": lambda v: Boundary.of(v, dims, "/end"),
-            "waypoint_states": lambda v: WaypointStates.of(v, n, dims, "/waypoint_states"),
-            "waypoint_tolerance": lambda v: _half_width(v, dims, "/waypoint_tolerance"),
-            "tube": lambda v: _half_width(v, dims, "/tube"),
-            "robot": lambda v: v,
-            "wrap": lambda v: _flags(v, dims, "/wrap"),
-            "joint_names": lambda v: _names(v, dims),
-            "timeout": lambda v: positive(v, "/timeout"),
-            "bound": bool,
-        }
         findings = reading.Findings()
-        read: dict[str, Any] = {k: findings.take(readers[k], v) for k, v in given.items() if v is not None}
+        read: dict[str, Any] = {k: findings.take(_READERS[k], v, n, dims) for k, v in given.items() if v is not None}
         findings.close()
         return cls(points, **read)
 
 
 def _times(value: Any, count: int) -> Array:
-    times = reading.increasing(reading.vector(value, "/times", count, MAX_TIME), "/times")
-    steps = np.diff(times)
-    if (steps < MIN_STEP).any():
+    times = reading.vector(value, "/times", count, MAX_TIME)
+    steps = times[1:] - times[:-1]
+    if not steps.min() >= MIN_STEP:
+        reading.increasing(times, "/times")
         i = int(np.argmax(steps < MIN_STEP)) + 1
         raise InvalidRequest.of(f"/times/{i}", "out_of_range", f"must be {MIN_STEP:g} s after the time before it")
     return times
@@ -177,6 +171,26 @@ def _names(value: Any, dims: int) -> tuple[str, ...]:
     return names
 
 
+#: How each field of a request but the waypoints is read: from what is sent and the numbers of waypoints and joints.
+_READERS: dict[str, Callable[[Any, int, int], Any]] = {
+    "times": lambda v, n, dims: _times(v, n),
+    "limits": lambda v, n, dims: Limits.of(v, dims),
+    "segment_limits": lambda v, n, dims: _each(v, n - 1, "/segment_limits", lambda e, f: Limits.of(e, dims, f)),
+    "segment_durations": lambda v, n, dims: _each(v, n - 1, "/segment_durations", DurationBounds.of),
+    "duration": lambda v, n, dims: DurationBounds.of(v, "/duration"),
+    "start": lambda v, n, dims: Boundary.of(v, dims, "/start"),
+    "end": lambda v, n, dims: Boundary.of(v, dims, "/end"),
+    "waypoint_states": lambda v, n, dims: WaypointStates.of(v, n, dims, "/waypoint_states"),
+    "waypoint_tolerance": lambda v, n, dims: _half_width(v, dims, "/waypoint_tolerance"),
+    "tube": lambda v, n, dims: _half_width(v, dims, "/tube"),
+    "robot": lambda v, n, dims: v,
+    "wrap": lambda v, n, dims: _flags(v, dims, "/wrap"),
+    "joint_names": lambda v, n, dims: _names(v, dims),
+    "timeout": lambda v, n, dims: positive(v, "/timeout"),
+    "bound": lambda v, n, dims: bool(v),
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Demands:
     """What an answer is held to: the caller's request with its defaults resolved, and nothing of any method.
@@ -185,14 +199,14 @@ class Demands:
     """
 
     dims: int
-    limits: Limits = field(default_factory=Limits)
+    limits: Limits = NO_LIMITS
     waypoints: Array | None = None
     times: Array | None = None
     segment_limits: tuple[Limits | None, ...] | None = None
     segment_durations: tuple[DurationBounds | None, ...] | None = None
     duration: DurationBounds | None = None
-    start: Boundary = field(default_factory=Boundary)
-    end: Boundary = field(default_factory=Boundary)
+    start: Boundary = NO_STATE
+    end: Boundary = NO_STATE
     waypoint_states: WaypointStates | None = None
     waypoint_tolerance: Array | None = None
     tube: Array | None = None
@@ -262,7 +276,10 @@ class Bound:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A method's answer, before anyone has checked it; ``minimised`` None: what its row of the table says."""
+    """A method's answer, before anyone has checked it; ``minimised`` None: what its row of the table says.
+
+    ``polyline``: whether the distance from the waypoints' polyline is to be told.
+    """
 
     trajectory: Trajectory
     waypoint_times: Array | None
@@ -271,6 +288,7 @@ class Solution:
     bound: Bound | None = None
     notes: tuple[Note, ...] = ()
     minimised: Minimised | None = None
+    polyline: bool = False
 
 
 @dataclass(frozen=True)

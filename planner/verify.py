@@ -5,14 +5,17 @@ a jump makes the next derivative unbounded, and an unbounded quantity holds no b
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .corridors import norm_row, polyline_distance, tolerance_row, tube_row
-from .jumps import Jumps
-from .limits import QUANTITIES, Boundary, DurationBounds, Limit, magnitude, segment_bounds
-from .quadrature import NODES, WEIGHTS, integral, integral_of
+from .jumps import GROWTH, JUMP, Jumps
+from .kernels.motion import survey
+from .kernels.speed import length
+from .limits import QUANTITIES, DurationBounds, Limit, is_limited, magnitude, segment_bounds
+from .quadrature import LOW, MOST_PIECES, NODES, WEIGHTS, integral
 from .rational import noise_of
 from .trajectory import Trajectory
 from .types import TOLERANCE, Certificate, Check, Demands, Followed
@@ -26,6 +29,7 @@ def verify(
     demands: Demands,
     waypoint_times: Array | None = None,
     path: Followed | None = None,
+    polyline: bool = False,
 ) -> Certificate:
     """Check a trajectory against what was asked of it.
 
@@ -38,6 +42,9 @@ def verify(
         When the waypoints are passed; where ``demands.times`` is set, those count instead.
     path : Followed
         The path the trajectory claims to follow exactly.
+    polyline : bool
+        Whether, without such a path, the distance from the waypoints' polyline is told even where no tube is asked;
+        it is not judged.
 
     Returns
     -------
@@ -45,24 +52,23 @@ def verify(
         ``holds`` is true only if everything asked is kept to 1e-6 relative.
     """
     at = demands.times if demands.times is not None else waypoint_times
-    inner = trajectory if at is None else trajectory.split(at)
+    inner = trajectory if at is None or at is trajectory.breaks else trajectory.split(at)
     motion = _measure(inner, demands, at)
     missed = _missed(motion, at)
     checks = _limit_rows(motion)
-    checks += [row] if (row := norm_row(inner, demands, motion.segment, motion.jumps[1])) is not None else []
+    if is_limited(demands.limits, demands.segment_limits, "velocity_norm"):
+        row = norm_row(inner, demands, motion.segment, motion.jumps[1])
+        checks += [] if row is None else [row]
     checks += _duration_rows(trajectory, demands, at)
     checks += _corridor_rows(motion, missed, at)
     waypoint_error = _waypoint_error(missed, demands, at, motion.span)
     boundary_error = _boundary_error(motion, at if missed is not None else None)
     deviation = None if path is None else _path_deviation(trajectory, path)
-    errors = [
-        waypoint_error,
-        boundary_error,
-        None if deviation is None else deviation / motion.span,
-    ]
-    if path is None and demands.tube is not None and demands.waypoints is not None and missed is not None:
+    errors = [waypoint_error, boundary_error, None if deviation is None else deviation / motion.span]
+    polyline = path is None and (polyline or demands.tube is not None)
+    if polyline and demands.waypoints is not None and missed is not None:
         deviation = polyline_distance(inner, demands.waypoints, motion.segment)  # told; what is judged is the tube
-    unbounded = np.asarray(motion.jumps.any(axis=1))  # which derivatives are so somewhere, (4, D)
+    highest, unbounded = motion.peaks.tolist(), motion.unbounded.tolist()
     return Certificate(
         holds=all(c.holds for c in checks) and all(e is None or e <= TOLERANCE for e in errors),
         basis="enclosure" if trajectory.rational else "exact",
@@ -72,12 +78,12 @@ def verify(
         continuity=_continuity(trajectory, motion),
         path_deviation=deviation,
         cost={
-            "squared_jerk": None if unbounded[3].any() else trajectory.squared_integral(3),
+            "squared_jerk": None if any(unbounded[3]) else trajectory.squared_integral(3),
             "path_length": path_length(trajectory),
         },
         peaks={
             name: tuple(None if bad else v for v, bad in zip(values, jumping, strict=True))
-            for name, values, jumping in zip(QUANTITIES, motion.peaks.tolist(), unbounded.tolist(), strict=True)
+            for name, values, jumping in zip(QUANTITIES, highest, unbounded, strict=True)
         },
     )
 
@@ -88,12 +94,22 @@ class _Motion:
 
     trajectory: Trajectory
     demands: Demands
-    segment: NDArray[np.int64]  # (K,)
+    at: Array | None
     span: float  # what errors of positions are relative to
     peaks: Array  # (4, D)
     jumps: NDArray[np.bool_]  # (4, K - 1, D): at which breaks a lower derivative jumps, so that this one is unbounded
+    unbounded: NDArray[np.bool_]  # (4, D): whether it is so anywhere
     judge: Jumps
-    lost: tuple[bool, ...]  # whether the position, velocity and acceleration jump by more than rounding explains
+    lost: tuple[bool, ...]  # whether the derivative of order 0, 1, … jumps by more than rounding explains
+
+    @cached_property
+    def segment(self) -> NDArray[np.int64]:
+        """The segment each piece belongs to, (K,)."""
+        breaks, at = self.trajectory.breaks, self.at
+        if at is None:
+            return np.zeros(self.trajectory.pieces, dtype=np.int64)
+        middles = 0.5 * (breaks[:-1] + breaks[1:])
+        return np.clip(np.searchsorted(at, middles, side="right") - 1, 0, max(len(at) - 2, 0))
 
     def end(self, order: int, index: int) -> Array:
         """Return a derivative at the start (index 0) or at the end (-1), (D,)."""
@@ -101,26 +117,26 @@ class _Motion:
 
 
 def _measure(trajectory: Trajectory, demands: Demands, at: Array | None) -> _Motion:
-    highest = peaks(trajectory, 4)
     span = position_span(trajectory if demands.waypoints is None else demands.waypoints)
-    judge, jumps = Jumps(trajectory, span), np.zeros((4, trajectory.pieces - 1, trajectory.dims), dtype=bool)
-    lost = []
+    if not trajectory.rational:
+        run = trajectory.breaks, trajectory.coefficients, trajectory.rates
+        ends, highest, jumps, unbounded, lost = survey(*run, span, JUMP, GROWTH)
+        judge = Jumps(trajectory, span, ends)
+        return _Motion(trajectory, demands, at, span, highest, jumps, unbounded, judge, tuple(lost.tolist()))
+    highest, judge = peaks(trajectory, 4), Jumps(trajectory, span)
+    jumps, told = np.zeros((4, trajectory.pieces - 1, trajectory.dims), dtype=bool), []
     for m in range(3):
         counted, smoothness_lost = judge.judged(m, highest[m])
         np.logical_or(jumps[m], counted, out=jumps[m + 1])
-        lost.append(smoothness_lost)
-    segment = np.zeros(trajectory.pieces, dtype=np.int64)
-    if at is not None:
-        middles = 0.5 * (trajectory.breaks[:-1] + trajectory.breaks[1:])
-        segment = np.clip(np.searchsorted(at, middles, side="right") - 1, 0, max(len(at) - 2, 0))
-    return _Motion(trajectory, demands, segment, span, highest, jumps, judge, tuple(lost))
+        told.append(smoothness_lost)
+    return _Motion(trajectory, demands, at, span, highest, jumps, np.asarray(jumps.any(axis=1)), judge, tuple(told))
 
 
 def position_span(points: Array | Trajectory) -> float:
     """Return what errors of positions are relative to: max(1, range of the points)."""
     if isinstance(points, Trajectory):
         points = np.concatenate(points.ends(0))
-    return max(1.0, float(np.ptp(points, axis=0).max()))
+    return max(1.0, float((points.max(axis=0) - points.min(axis=0)).max()))
 
 
 def _continuity(trajectory: Trajectory, motion: _Motion) -> int | None:
@@ -151,17 +167,17 @@ def _limit_rows(motion: _Motion) -> list[Check]:
     """Return a row for every limited quantity: the worst joint, segment and time."""
     demands = motion.demands
     if demands.segment_limits is None:
-        row, present = np.zeros_like(motion.segment), np.zeros(1, dtype=np.int64)
+        if all(getattr(demands.limits, name) is None for name in QUANTITIES):
+            return []
+        row, present = np.zeros(motion.trajectory.pieces, dtype=np.int64), np.zeros(1, dtype=np.int64)
         bounds = (demands.limits.bounds(m, demands.dims) for m in range(len(QUANTITIES)))
         each = [Limit(x.lower[None], x.upper[None]) for x in bounds]
     else:
         segments = len(demands.segment_limits)
         row = np.minimum(motion.segment, segments - 1)
         present = np.unique(row)
-        each = [
-            segment_bounds(demands.limits, demands.segment_limits, m, segments, demands.dims)
-            for m in range(len(QUANTITIES))
-        ]
+        both = demands.limits, demands.segment_limits
+        each = [segment_bounds(*both, m, segments, demands.dims) for m in range(len(QUANTITIES))]
     lower, upper = np.array([x.lower for x in each]), np.array([x.upper for x in each])  # (4, S, D)
     limited = (np.isfinite(lower) | np.isfinite(upper))[:, present].any(axis=(1, 2)).tolist()
     if not any(limited):
@@ -175,16 +191,13 @@ def _limit_rows(motion: _Motion) -> list[Check]:
     excess = told.most - np.array([0.0, 1.0, 1.0, 1.0])[:, None]
     if lopsided:  # what counts is the distance over the larger side
         excess = worst(motion.trajectory, *distance, row).most
-    return [
-        _limit_row(motion, each[m], row, m, told, bool(excess[m].max() <= TOLERANCE))
-        for m in range(len(QUANTITIES))
-        if limited[m]
-    ]
+    holds = (excess.max(axis=1) <= TOLERANCE).tolist()
+    return [_limit_row(motion, each[m], row, m, told, holds[m]) for m in range(len(QUANTITIES)) if limited[m]]
 
 
 def _limit_row(motion: _Motion, limit: Limit, row: NDArray[np.int64], order: int, found: Worst, holds: bool) -> Check:
     quantity = QUANTITIES[order]
-    if motion.jumps[order].any():
+    if motion.unbounded[order].any():
         lower, upper = limit.lower[row], limit.upper[row]
         bounded = np.isfinite(lower) | np.isfinite(upper)
         infinite = motion.jumps[order] & bounded[:-1] & bounded[1:]  # between segments: where both are limited
@@ -197,7 +210,7 @@ def _limit_row(motion: _Motion, limit: Limit, row: NDArray[np.int64], order: int
     if not (np.isfinite(motion.peaks[order]).all() and np.isfinite(most)):  # beyond floating point: nothing is held
         return Check(quantity, None, None, None, None, None, None, False)
     ties = np.flatnonzero(badness >= most - TIE * abs(most))  # the earliest, whatever rounding prefers
-    joint = int(ties[np.argmin(found.time[order, ties])])
+    joint = int(ties[np.argmin(found.time[order, ties])]) if len(ties) else int(np.argmax(badness))
     piece, value = int(found.piece[order, joint]), float(found.value[order, joint])
     low, high = float(limit.lower[row[piece], joint]), float(limit.upper[row[piece], joint])
     bound = low if found.side[order, joint] else high
@@ -220,11 +233,8 @@ def _duration_rows(trajectory: Trajectory, demands: Demands, at: Array | None) -
         rows.append(_duration_row("duration", trajectory.duration, demands.duration, None))
     if demands.segment_durations is not None:
         steps = np.full(len(demands.segment_durations), np.nan) if at is None else np.diff(at)
-        each = [
-            _duration_row("segment_duration", float(step), bounds, i)
-            for i, (step, bounds) in enumerate(zip(steps, demands.segment_durations, strict=True))
-            if bounds is not None
-        ]
+        pairs = enumerate(zip(steps, demands.segment_durations, strict=True))
+        each = [_duration_row("segment_duration", float(x), own, i) for i, (x, own) in pairs if own is not None]
         rows += sorted(each, key=lambda c: (c.holds, -abs((c.ratio or 0.0) - 1.0) if not c.holds else 0.0))[:1]
     return rows
 
@@ -243,7 +253,7 @@ def _corridor_rows(motion: _Motion, missed: Array | None, at: Array | None) -> l
     rows = [tolerance_row(missed, demands, at, motion.span)]
     if demands.tube is not None and missed is None:  # which segment a position belongs to is not known
         rows.append(Check("tube", None, None, None, None, None, None, False))
-    else:
+    elif demands.tube is not None:
         rows.append(tube_row(motion.trajectory, demands, motion.segment, motion.span))
     return [row for row in rows if row is not None]
 
@@ -256,16 +266,24 @@ def _missed(motion: _Motion, at: Array | None) -> Array | None:
     trajectory, demands = motion.trajectory, motion.demands
     if demands.waypoints is None or at is None:
         return None
-    slack = 1e-9 * max(1.0, trajectory.duration)
-    inside = (at >= trajectory.start - slack) & (at <= trajectory.end + slack)
-    if len(at) != len(demands.waypoints) or not inside.all() or (np.diff(at) < 0).any():
+    if len(at) != len(demands.waypoints):
         return None
+    if at is not trajectory.breaks:
+        slack = 1e-9 * max(1.0, trajectory.duration)
+        inside = (at >= trajectory.start - slack) & (at <= trajectory.end + slack)
+        if not inside.all() or (np.diff(at) < 0).any():
+            return None
     return np.asarray(np.abs(_on_both_sides(motion, at, 0) - demands.waypoints).max(axis=0))
 
 
 def _on_both_sides(motion: _Motion, at: Array, order: int) -> Array:
     """Return a derivative at times, from the right and from the left of them, (2, N, D)."""
     trajectory, pieces = motion.trajectory, motion.trajectory.pieces
+    if at is trajectory.breaks:
+        states, both = motion.judge.ends(order), np.empty((2, len(at), trajectory.dims))
+        both[0, :-1], both[0, -1] = states[0], states[1, -1]
+        both[1, 1:], both[1, 0] = states[1], states[0, 0]
+        return both
     index = np.searchsorted(trajectory.breaks, at)
     if (trajectory.breaks[np.minimum(index, pieces)] == at).all():  # as is usual: no time is beyond the clock
         starts, stops = motion.judge.ends(order)
@@ -302,8 +320,7 @@ def _boundary_error(motion: _Motion, at: Array | None) -> float | None:
     """
     demands, errors = motion.demands, []
     asked: list[tuple[int, Array, Array]] = []  # order, what is asked, what is reached
-    ends: tuple[tuple[Boundary, int], ...] = ((demands.start, 0), (demands.end, -1))
-    for boundary, index in ends:
+    for boundary, index in ((demands.start, 0), (demands.end, -1)):
         for order, name in enumerate(QUANTITIES):
             if getattr(boundary, name, None) is not None:
                 asked.append((order, getattr(boundary, name), motion.end(order, index)))
@@ -315,13 +332,15 @@ def _boundary_error(motion: _Motion, at: Array | None) -> float | None:
             return float("inf")
         for order, rows in ((1, states.velocity), (2, states.acceleration)):
             asked.append((order, rows, _on_both_sides(motion, at, order)))
-    relative = {
-        m: np.maximum(np.maximum(1.0, demands.limits.bounds(m, demands.dims).scale()), motion.peaks[m])
-        for m in {order for order, _, _ in asked}
-    }
+    relative = {m: np.maximum(1.0, motion.peaks[m]) for m in {order for order, _, _ in asked}}
+    for m in relative:
+        if getattr(demands.limits, QUANTITIES[m]) is not None:
+            relative[m] = np.maximum(relative[m], demands.limits.bounds(m, demands.dims).scale())
     for order, wanted, reached in asked:
         off = np.abs(reached - wanted) / relative[order]
-        errors.append(float(off[~np.isnan(np.broadcast_to(wanted, off.shape))].max(initial=0.0)))
+        if np.isnan(most := float(off.max())):  # where nothing is asked
+            most = float(off[~np.isnan(np.broadcast_to(wanted, off.shape))].max(initial=0.0))
+        errors.append(most)
     return max(errors, default=None)
 
 
@@ -365,14 +384,7 @@ def path_length(trajectory: Trajectory) -> float:
         return 0.0
     if trajectory.rational:
         return _rational_length(trajectory)
-    from .kernels.speed import speeds
-
-    def look(piece: NDArray[np.int64], left: Array, width: Array) -> Array:
-        out = np.empty((6, len(piece)))
-        speeds(trajectory.coefficients, piece, left, width, NODES, WEIGHTS, out)
-        return out
-
-    return integral_of(look, trajectory.pieces)
+    return float(length(trajectory.coefficients, NODES, WEIGHTS, LOW, MOST_PIECES, max(1 << 18, 8 * trajectory.pieces)))
 
 
 def _rational_length(trajectory: Trajectory) -> float:

@@ -56,15 +56,13 @@ def worst(trajectory: Trajectory, gain: Array, shift: Array, row: NDArray[np.int
 
 def peaks(trajectory: Trajectory, orders: int) -> Array:
     """Return the largest magnitude of the derivatives of order 0 … orders - 1, (orders, D)."""
-    gain = np.ones((2, orders, 1, trajectory.dims))
-    gain[1] = -1.0
     if trajectory.rational:
+        gain = np.ones((2, orders, 1, trajectory.dims))
+        gain[1] = -1.0
         return np.maximum(worst(trajectory, gain, np.zeros_like(gain)).most, 0.0)
-    from .kernels.worst import worst as kernel
+    from .kernels.motion import highest
 
-    row = np.zeros(trajectory.pieces, dtype=np.int64)
-    most = kernel(trajectory.coefficients, trajectory.rates, row, gain, np.zeros_like(gain))[5]
-    return np.asarray(np.maximum(most, 0.0))
+    return np.asarray(highest(trajectory.coefficients, trajectory.rates, trajectory.all_ends(0, orders)))
 
 
 def measures(lower: Array, upper: Array, scale: Array | None = None) -> tuple[Array, Array]:

@@ -24,11 +24,12 @@ LAYERS = [
     {"curves", "solvers", "corridors"},
     {"paths"},
     {"smoothing", "timing", "fitting"},
+    {"waypoints"},
     {"method", "verify", "bounds", "feasibility"},
     {"methods"},
     {"check"},
     {"sampling", "certification", "planning"},
-    {"comparison", "catalogue", "cases", "retiming"},
+    {"comparison", "catalogue", "cases", "compat", "retiming"},
 ]
 RANK = {name: rank for rank, layer in enumerate(LAYERS) for name in layer}
 SOURCES = [p for name in ("planner", "problems", "api") for p in sorted((ROOT / name).rglob("*.py"))]
@@ -111,6 +112,17 @@ def test_modules_are_small():
     for path in SOURCES:
         limit = 150 if path.parent.name == "methods" and path.parent.parent.name == "planner" else 400
         assert len(path.read_text().splitlines()) <= limit, path
+
+
+def test_kernels_leave_no_rounding_to_the_compiler():
+    """Every copy that LLVM makes of a kernel, compiled or from the cache, inlined or not, is to give the same bytes."""
+    for path in sorted((ROOT / "planner").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            where = f"{path}:{getattr(node, 'lineno', 0)}"
+            if isinstance(node, ast.Call):
+                assert not {"fastmath", "flags"} & {k.arg for k in node.keywords}, where
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                assert "fmuladd" not in node.value, f"{where}: fused only where LLVM sees fit"
 
 
 def test_exported_names_exist_and_shadow_no_module():

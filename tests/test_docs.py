@@ -16,13 +16,14 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "minimum_jerk.md").read_text(encoding="utf-8")
 RETIMING = (ROOT / "docs" / "retiming.md").read_text(encoding="utf-8")
 TIMING = (ROOT / "docs" / "time_optimal_path.md").read_text(encoding="utf-8")
-PYTHON = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE + RETIMING + TIMING, re.S)
-BODIES = [json.loads(text) for text in re.findall(r"```json\n(.*?)```", PAGE + TIMING, re.S)]
+WAYPOINTS = (ROOT / "docs" / "time_optimal_waypoints.md").read_text(encoding="utf-8")
+PYTHON = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE + RETIMING + TIMING + WAYPOINTS, re.S)
+BODIES = [json.loads(text) for text in re.findall(r"```json\n(.*?)```", PAGE + TIMING + WAYPOINTS, re.S)]
 REQUESTS = [body for body in BODIES if "waypoints" in body]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
-@pytest.mark.parametrize("number", range((PAGE + RETIMING + TIMING).count("```python")))
+@pytest.mark.parametrize("number", range((PAGE + RETIMING + TIMING + WAYPOINTS).count("```python")))
 def test_python_prints_what_is_shown(number, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     code, shown = PYTHON[number]
@@ -58,6 +59,12 @@ def test_retimings_are_answered(service):
     for body in bodies:
         answer = service.post("/v1/retimings", json=body)
         assert answer.status_code == 200 and answer.json()["certificate"]["holds"]
+
+
+def test_the_shown_command_is_answered(service):
+    (body,) = re.findall(r"-d '(.*?)'", WAYPOINTS, re.S)
+    answer = service.post("/v1/trajectories", json=json.loads(body))
+    assert answer.status_code == 200 and answer.json()["certificate"]["holds"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])

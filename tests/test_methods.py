@@ -104,6 +104,39 @@ REQUESTS = {
         "start": {"velocity": [0.1, 0.2, -0.1]},
         "end": {"velocity": [0.2, 0.4, -0.2]},
     },
+    "jerk_and_all": {
+        "waypoints": LINE,
+        "limits": {
+            "position": {"lower": [-1, -0.5, None], "upper": [3, 5, 1.5]},
+            "velocity": {"lower": [-1.0, -2.0, -1.5], "upper": [1.2, 2.0, 1.5]},
+            "acceleration": 3.0,
+            "jerk": {"lower": -25.0, "upper": [30.0, 30.0, 20.0]},
+        },
+        "segment_limits": [None, {"velocity": 0.9, "jerk": 15.0}, {"acceleration": [1.5, None, 2.0]}],
+        "segment_durations": [{"min": 1.5}, None, {"min": 0.5, "max": 4}],
+        "duration": {"min": 9, "max": 9.5},
+        "start": {"velocity": [0.1, 0.2, -0.1]},
+    },
+    "jerk_duration": {
+        "waypoints": POINTS,
+        "limits": {"velocity": 1.0, "acceleration": 3.0, "jerk": 30.0},
+        "duration": {"min": 12, "max": 12},
+    },
+    "jerk_position": {
+        "waypoints": POINTS,
+        "limits": {
+            "position": {"lower": [-1, -1, None], "upper": 2.0},
+            "velocity": 1.0,
+            "acceleration": 3.0,
+            "jerk": 30.0,
+        },
+    },
+    "jerk_states": {
+        "waypoints": POINTS,
+        "limits": {"velocity": 1.0, "acceleration": 3.0, "jerk": 30.0},
+        "segment_durations": [None, None, None, {"min": 0.4, "max": 0.4}, None],
+        "waypoint_states": [None, {"velocity": [0.2, None, 0.0]}, {"velocity": [0, 0, 0]}, None, None, None],
+    },
     "still": {"waypoints": [[1, 2, 3]] * 3, "limits": {"velocity": 1.0, "acceleration": 3.0}},
     "still_times": {"waypoints": [[1, 2, 3]] * 3, "times": [0, 1, 2]},
     "mixed_scales": {"waypoints": [[0, 0, 0], [1e6, 1e-9, 1e-16]], "limits": {"velocity": 1e3, "acceleration": 1e4}},
@@ -152,7 +185,7 @@ REQUESTS = {
     },
     "robot": {"waypoints": POINTS, "times": TIMES, "robot": {"model": "ur5e"}},
 }
-#: They need nothing but limits.
+#: They need nothing but limits on velocity and acceleration.
 TIMING_BY_LIMITS = ("trapezoidal", "ruckig", "time_scaled", "toppra", "time_optimal_path", "time_optimal_nlp")
 
 ROWS = [(m.id, i, dict(v)) for m in METHODS.values() for i, v in enumerate(({}, *m.variants))]
@@ -179,8 +212,8 @@ def must_accept(request, can):
 def excused(method, options, request):
     """What no honest answer exists for: a periodic spline through open points, uniform scaling with nothing to keep,
     fewer points than a degree needs, Bézier segments that the points do not make or that are not joined as asked, a
-    fixed path entered or left in another direction than its own."""
-    if METHODS[method].path == "fixed" and (request.start.given() or request.end.given()):
+    fixed path, or a straight line, entered or left in another direction than its own."""
+    if (METHODS[method].path == "fixed" or options.get("straight")) and (request.start.given() or request.end.given()):
         if np.linalg.matrix_rank(np.diff(request.waypoints, axis=0)) > 1:
             return True
     if options.get("boundary") == "periodic":
@@ -244,7 +277,7 @@ def test_battery(method, index, options, name):
         assert certificate.waypoint_error <= 1e-9 + allowed
         assert first.waypoint_times.shape == (request.count,)
     assert certificate.boundary_error is None or certificate.boundary_error <= 1e-9
-    followed = row.path == "fixed" or request.tube is not None
+    followed = row.path == "fixed" or request.tube is not None or method == "time_optimal_waypoints"
     assert followed == (certificate.path_deviation is not None) or name.startswith("still")
     if row.objective is None:
         assert certificate.objective is None
@@ -275,6 +308,9 @@ def test_compare_keeps_order_and_turns_refusals_into_rows():
     rows = compare(request_of("velocity_acceleration"))
     assert [r.method for r in rows] == list(METHODS)
     assert {r.method for r in rows if r.plan} == {*TIMING_BY_LIMITS}
+    rows = compare(request_of("moving_along_a_line"))
+    with_moving_ends = {"ruckig", "time_optimal_path", "time_optimal_waypoints"}
+    assert {r.method for r in rows if r.plan} == with_moving_ends
     assert all((r.plan is None) != (r.error is None) for r in rows)
 
 

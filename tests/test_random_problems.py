@@ -76,8 +76,8 @@ def seeds(default):
 
 
 def test_a_slice_of_random_problems(client, random_problem):
-    for seed in seeds((0, 150)):
-        check(client, seed, random_problem(seed), slow=seed % 50 == 0)
+    for seed in seeds((0, 80)):
+        check(client, seed, random_problem(seed), slow=seed % 40 == 0)
 
 
 @pytest.mark.slow

@@ -35,15 +35,22 @@ def running():
 def test_python_snippet(capsys):
     exec(compile(PYTHON[0], "README", "exec"), {})
     out = capsys.readouterr().out
-    assert out.startswith("ruckig ") and "True" in out and ", 2)" in out
+    assert out.startswith("time_optimal_waypoints ") and "True" in out and ", 2)" in out
+
+
+def test_through_waypoints_snippet(capsys):
+    exec(compile(PYTHON[2], "README", "exec"), {})
+    fastest, smooth, straight = (row.split() for row in capsys.readouterr().out.splitlines())
+    assert float(fastest[0]) < float(smooth[0]) and float(fastest[0]) < float(straight[0])
+    assert float(straight[1]) < 1e-9 < float(fastest[1]) and {fastest[2], smooth[2], straight[2]} == {"True"}
 
 
 def test_corridor_and_free_times_snippets(capsys):
-    exec(compile(PYTHON[2], "README", "exec"), {})
+    exec(compile(PYTHON[3], "README", "exec"), {})
     rows = capsys.readouterr().out.splitlines()
     assert [row.split()[0] for row in rows] == ["velocity_norm", "waypoint_tolerance", "tube"]
     assert all(row.endswith(" True") for row in rows)
-    exec(compile(PYTHON[3], "README", "exec"), {})
+    exec(compile(PYTHON[4], "README", "exec"), {})
     assert capsys.readouterr().out.rstrip().endswith(" True")
 
 
@@ -62,6 +69,6 @@ def test_client_and_curl_snippets(capsys):
 @pytest.mark.parametrize("line", SHELL[1].strip().splitlines())
 def test_command_lines(line, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    Path("request.json").write_text(json.dumps({"waypoints": [[0], [1]], "times": [0, 1]}))
+    Path("request.json").write_text(json.dumps({"waypoints": [[0] * 6, [1] * 6], "times": [0, 1]}))
     assert main(line.split()[1:]) == 0
     assert capsys.readouterr().out or Path("trajectory.csv").read_text().startswith("time,position_1")

@@ -10,11 +10,13 @@ from starlette.responses import Response
 
 from planner import CASES, __version__
 
-from .. import encode
 from ..errors import KINDS, Refusal
+from ..formats import encoded, offered
+from ..media import JSON, MARKDOWN
 from ..negotiate import choose
 from ..openapi import operation
-from ..web import caps_of, no_query, respond
+from ..state import State
+from ..web import accepted, caps_of, no_query, respond
 
 router = APIRouter(dependencies=[Depends(no_query)])
 
@@ -39,15 +41,17 @@ LIBRARIES = (
 @router.get("/healthz", **operation("healthz"))
 async def healthz() -> Response:
     """Tell that the process answers; touches nothing."""
-    return Response(b'{"status":"ok"}', media_type=encode.JSON)
+    return Response(b'{"status":"ok"}', media_type=JSON)
 
 
 @router.get("/readyz", **operation("readyz"))
 async def readyz(request: Request) -> Response:
-    """Tell whether the kernels are warm."""
-    if not request.app.state.warmup.ready:
-        raise Refusal("overloaded", "the service is still warming up", headers={"Retry-After": "1"})
-    return Response(b'{"status":"ready"}', media_type=encode.JSON)
+    """Tell whether requests are taken: solvers answer, kernels are warm, and the service is not stopping."""
+    state: State = request.app.state.service
+    if not state.ready:
+        detail = "the service is stopping" if state.draining else "the service is still warming up"
+        raise Refusal("overloaded", detail, headers={"Retry-After": "1"})
+    return Response(b'{"status":"ready"}', media_type=JSON)
 
 
 @router.get("/v1/version", **operation("version"))
@@ -88,8 +92,8 @@ async def explain(request: Request) -> Response:
     if code not in KINDS:
         raise Refusal("not_found", f"there is no error code {code[:60]!r}", {"known": list(KINDS)})
     kind = KINDS[code]
-    media_type = choose(request.headers.get("accept"), (encode.JSON, "text/markdown"))
-    if media_type == encode.JSON:
+    media_type = choose(accepted(request), (*offered(whole=False), MARKDOWN))
+    if media_type != MARKDOWN:
         tree = {"code": code, "title": kind.title, "status": kind.status, "explanation": kind.explanation}
-        return Response(encode.dumps(tree), media_type=media_type)
+        return Response(encoded(tree, media_type), media_type=media_type)
     return Response(f"# {kind.title}\n\n`{code}`, status {kind.status}\n\n{kind.explanation}\n", media_type=media_type)

@@ -1,5 +1,8 @@
 """``GET /v1/methods``: what each method does, needs and honours."""
 
+from functools import cache
+from typing import Any
+
 from fastapi import APIRouter, Depends
 from starlette.requests import Request
 from starlette.responses import Response
@@ -15,7 +18,13 @@ router = APIRouter(dependencies=[Depends(no_query)])
 @router.get("/v1/methods", **operation("methods"))
 def methods(request: Request) -> Response:
     """List the methods in order of presentation."""
-    return respond(request, list_methods())
+    return respond(request, _rows())
+
+
+@cache
+def _rows() -> list[dict[str, Any]]:
+    """Return the catalogue, which does not change: to make its schemas takes a tenth of a second."""
+    return list_methods()
 
 
 @router.get("/v1/methods/{id}", **operation("method"))

@@ -31,7 +31,9 @@ class PolynomialOptions(Spaced):
         default="given", description="the times sent, or chebyshev: computed in the interval (then send no times)"
     )
     interval: Annotated[list[Time], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="[a, b] in s, for chebyshev: the whole motion; the nodes lie inside"
+        default=None,
+        description="[a, b] in s, for chebyshev: the whole motion; the nodes lie inside",
+        json_schema_extra={"unit": "s"},
     )
 
     @field_validator("interval")

@@ -33,6 +33,7 @@ class BsplineOptions(Spaced):
         default=None,
         description="the full vector, N + degree + 1 (default for control points: clamped and even, on [0, 1] or "
         "[0, duration]; through waypoints: clamped and at waypoints, without those next to the ends)",
+        json_schema_extra={"unit": "s"},
     )
 
     @property

@@ -36,7 +36,9 @@ class BezierOptions(Options):
         "(default: one curve of degree N - 1)",
     )
     knots: Annotated[list[Number], Field(min_length=2, fail_fast=True)] | None = Field(
-        default=None, description="where the segments begin and end, s (default: even, on [0, 1] or [0, duration])"
+        default=None,
+        description="where the segments begin and end, s (default: even, on [0, 1] or [0, duration])",
+        json_schema_extra={"unit": "s"},
     )
     joints: Joints = Field(
         default="C0", description="the class that the control points must give at the joints, else they are refused"

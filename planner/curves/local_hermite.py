@@ -28,6 +28,7 @@ class CubicHermiteOptions(Spaced):
         default="catmull_rom",
         description="N×D velocities at the waypoints, per second, or a rule: catmull_rom (from the waypoint before "
         "to the one after), finite_difference (mean of both slopes), monotone (no overshoot)",
+        json_schema_extra={"unit": "unit/s"},
     )
 
     @property

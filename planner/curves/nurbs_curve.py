@@ -27,6 +27,7 @@ class NurbsOptions(Options):
     knots: Knots | None = Field(
         default=None,
         description="the full vector, N + degree + 1 (default: clamped and even, on [0, 1] or [0, duration])",
+        json_schema_extra={"unit": "s"},
     )
     weights: Annotated[list[Number], Field(fail_fast=True)] | None = Field(
         default=None, description="N weights > 0 (default: all 1, which is the B-spline)"

@@ -19,6 +19,7 @@ class HermiteOptions(Spaced):
     velocities: Matrix | None = Field(
         default=None,
         description="N×D velocities at the waypoints, unit/s (default: finite differences, with a warning)",
+        json_schema_extra={"unit": "unit/s"},
     )
 
     @property

@@ -14,7 +14,7 @@ from .worst import _exact
 FLAT = 1e-3
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _hull(poly, degree, order, own):  # type: ignore[no-untyped-def]
     """Return the smallest and the largest Bernstein coefficient of a derivative on [0, 1]; highest power first."""
     left = degree - order
@@ -34,7 +34,7 @@ def _hull(poly, degree, order, own):  # type: ignore[no-untyped-def]
     return low, high
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _weights(basis, m, u, weights):  # type: ignore[no-untyped-def]
     """Let weights be those of a gap's scaled states in the derivative in u of order m, at u."""
     size = len(basis)
@@ -48,7 +48,7 @@ def _weights(basis, m, u, weights):  # type: ignore[no-untyped-def]
         power *= u * (j + 1.0) / (j + 1.0 - m)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _row(weights, factor, i, direction, shape, columns, values):  # type: ignore[no-untyped-def]
     """Write a row: entries of y and their values; return its constant without the reference."""
     h, local, given = shape[0][i], shape[1], shape[2]

@@ -7,11 +7,13 @@ right of it) and [[168 r'³, -24 r'²], [24 r'², -3 r']] couples it to the next
 
 from numba import njit
 
+from .lanes import minus, step
+
 #: Neighbouring steps may differ by this factor: the states are then exact to about 1e-13.
 EVEN = 30.0
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def jerk_states(h, points, ends, work, states):  # type: ignore[no-untyped-def]
     """Find the velocities and accelerations at the knots, those at the ends being given.
 
@@ -47,29 +49,29 @@ def jerk_states(h, points, ends, work, states):  # type: ignore[no-untyped-def]
         r2 = r1 * r1
         r3 = r2 * r1
         c00, c01, c11 = 168.0 * l3, -24.0 * l2, -3.0 * l1  # the coupling to the node before; c10 is -c01
-        d00 = 192.0 * (l3 + r3) - c00 * n00 + c01 * n10
-        d01 = 36.0 * (r2 - l2) - c00 * n01 + c01 * n11
-        d11 = 9.0 * (l1 + r1) - c01 * n01 - c11 * n11
-        inverse = 1.0 / (d00 * d11 - d01 * d01)
+        d00 = step(c01, n10, minus(c00, n00, 192.0 * (l3 + r3)))
+        d01 = step(c01, n11, minus(c00, n01, 36.0 * (r2 - l2)))
+        d11 = minus(c01, n01, minus(c11, n11, 9.0 * (l1 + r1)))
+        inverse = 1.0 / minus(d01, d01, d00 * d11)
         q00, q01, q11 = d11 * inverse, -d01 * inverse, d00 * inverse
         e00, e01, e11 = 168.0 * r3, -24.0 * r2, -3.0 * r1
-        n00, n01 = q00 * e00 - q01 * e01, q00 * e01 + q01 * e11
-        n10, n11 = q01 * e00 - q11 * e01, q01 * e01 + q11 * e11
+        n00, n01 = minus(q01, e01, q00 * e00), step(q01, e11, q00 * e01)
+        n10, n11 = minus(q11, e01, q01 * e00), step(q11, e11, q01 * e01)
         work[i, 0], work[i, 1], work[i, 2], work[i, 3] = n00, n01, n10, n11
         left0, right0, left1, right1 = 360.0 * l2 * l2, 360.0 * r2 * r2, 60.0 * l3, 60.0 * r3
         for d in range(dims):
             before, after = points[i, d] - points[i - 1, d], points[i + 1, d] - points[i, d]
             v, a = states[0, i - 1, d], states[1, i - 1, d]
-            b0 = left0 * before + right0 * after - c00 * v + c01 * a
-            b1 = right1 * after - left1 * before - c01 * v - c11 * a
-            states[0, i, d], states[1, i, d] = q00 * b0 + q01 * b1, q01 * b0 + q11 * b1
+            b0 = step(c01, a, minus(c00, v, step(left0, before, right0 * after)))
+            b1 = minus(c11, a, minus(c01, v, minus(left1, before, right1 * after)))
+            states[0, i, d], states[1, i, d] = step(q00, b0, q01 * b1), step(q01, b0, q11 * b1)
         l1, l2, l3 = r1, r2, r3
     trouble = 0.0
     for i in range(last - 1, 0, -1):
         n00, n01, n10, n11 = work[i, 0], work[i, 1], work[i, 2], work[i, 3]
         for d in range(dims):
             v, a = states[0, i + 1, d], states[1, i + 1, d]
-            states[0, i, d] -= n00 * v + n01 * a
-            states[1, i, d] -= n10 * v + n11 * a
+            states[0, i, d] = minus(n00, v, minus(n01, a, states[0, i, d]))
+            states[1, i, d] = minus(n10, v, minus(n11, a, states[1, i, d]))
             trouble += 0.0 * (states[0, i, d] + states[1, i, d])
     return trouble == 0.0

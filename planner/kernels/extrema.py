@@ -15,7 +15,7 @@ CLOSE = 1e-6
 EPS = 2.220446049250313e-16
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _quartic(c0, c1, c2, c3, c4, u):  # type: ignore[no-untyped-def]
     return (((c0 * u + c1) * u + c2) * u + c3) * u + c4
 
@@ -48,7 +48,7 @@ def _changes(a, b):  # type: ignore[no-untyped-def]
     return (a < 0.0 < b) or (b < 0.0 < a)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _root(c0, c1, c2, c3, c4, lo, hi, at_lo, at_hi):  # type: ignore[no-untyped-def]
     """Return the root of a quartic that is monotone on [lo, hi], or hi without a change of sign.
 
@@ -76,7 +76,7 @@ def _root(c0, c1, c2, c3, c4, lo, hi, at_lo, at_hi):  # type: ignore[no-untyped-
     return u
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _root_of_quadratic(a, b, c, lo, hi, at_lo, at_hi):  # type: ignore[no-untyped-def]
     """Return the root of a quadratic that is monotone on [lo, hi], or hi without a change of sign."""
     if not _changes(at_lo, at_hi):
@@ -103,7 +103,7 @@ def _including(extremes, u, value):  # type: ignore[no-untyped-def]
     return low, at_low, high, at_high
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def quintic(c0, c1, c2, c3, c4, c5, lowest):  # type: ignore[no-untyped-def]
     """Return (low, at_low, high, at_high) of the derivatives of order 0 … 5; those below ``lowest`` are not found.
 
@@ -150,7 +150,7 @@ def quintic(c0, c1, c2, c3, c4, c5, lowest):  # type: ignore[no-untyped-def]
     return e0, e1, e2, e3, e4, e5
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def chain(table, lowest, points, values, found):  # type: ignore[no-untyped-def]
     """Write the extrema of the derivatives of order ``lowest`` … R - 1 of one polynomial of any degree.
 

@@ -16,6 +16,7 @@ from numba import njit
 
 from .elimination import jerk_states
 from .free_times_energy import energy2, energy3, energy4
+from .lanes import LANES, added, load, step
 from .splines import hermite_states
 
 MEMORY = 8
@@ -154,11 +155,19 @@ def _stationarity(h, slope, noise, value, rho, total, low, high, free, gradient)
     return worst / size if size > 0.0 else worst, good
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+@njit(cache=True, error_model="numpy")
 def _dot(a, b, weight):  # type: ignore[no-untyped-def]
+    """Return the sum of the products, in eight sums side by side: the terms of one would wait for each other."""
+    count = len(a)
+    whole = count & -LANES
     total = 0.0
-    for i in range(len(a)):
-        total += a[i] * b[i] * weight[i]
+    if whole:
+        x = load(a, 0) * load(b, 0) * load(weight, 0)
+        for i in range(LANES, whole, LANES):
+            x = step(load(a, i) * load(b, i), load(weight, i), x)
+        total = added(x)
+    for i in range(whole, count):
+        total = step(a[i] * b[i], weight[i], total)
     return total
 
 

@@ -8,10 +8,13 @@ from the longer gap beside, where they have more digits.
 
 from numba import njit
 
+from .lanes import minus
+from .lanes import step as fused
+
 EPS = 2.220446049250313e-16
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def energy2(h, points, states, slope, noise):  # type: ignore[no-untyped-def]
     """Order 2: see above."""
     gaps, total = len(h), 0.0
@@ -27,21 +30,21 @@ def energy2(h, points, states, slope, noise):  # type: ignore[no-untyped-def]
                 v0, v1 = step * states[0, i, d], step * states[0, i + 1, d]
                 rate = 1.0 / step
                 scale = rate * rate
-                c3, mean = v0 + v1 - 2.0 * rise, v1 - v0
-                total += (mean * mean + 3.0 * c3 * c3) * (scale * rate)
+                c3, mean = minus(2.0, rise, v0 + v1), v1 - v0
+                total = fused(fused(mean, mean, 3.0 * c3 * c3), scale * rate, total)
                 left = 2.0 * (rise - v0 - c3) * scale
-                right = left + 6.0 * c3 * scale
+                right = fused(6.0 * c3, scale, left)
                 right_blur = (32.0 * EPS) * (abs(rise) + abs(v0) + abs(v1)) * scale
                 if i == 0 or step > h[i - 1]:
                     here, blur = left, right_blur
             if i > 0:
                 v = states[0, i - 1, d]
-                slope[i - 1] += 2.0 * v * (here - before) - h[i - 1] * before * before
-                noise[i - 1] += (abs(v) + h[i - 1] * abs(before)) * (before_blur + blur)
+                slope[i - 1] += minus(h[i - 1] * before, before, 2.0 * v * (here - before))
+                noise[i - 1] = fused(fused(h[i - 1], abs(before), abs(v)), before_blur + blur, noise[i - 1])
     return total
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def energy3(h, points, states, slope, noise):  # type: ignore[no-untyped-def]
     """Order 3: see above."""
     gaps, total = len(h), 0.0
@@ -74,7 +77,7 @@ def energy3(h, points, states, slope, noise):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def energy4(h, points, states, slope, noise):  # type: ignore[no-untyped-def]
     """Order 4: see above."""
     gaps, total = len(h), 0.0
@@ -92,14 +95,16 @@ def energy4(h, points, states, slope, noise):  # type: ignore[no-untyped-def]
                 j = (j1 - j0) * (1.0 / 6.0)
                 x = rise - v0 - 0.5 * a0 - (1.0 / 6.0) * j0
                 v, a = v1 - v0 - a0 - 0.5 * j0, 0.5 * (a1 - a0 - j0)
-                c4, c5 = 35.0 * x - 15.0 * v + 5.0 * a - j, 39.0 * v - 84.0 * x - 14.0 * a + 3.0 * j
-                c6, c7 = 70.0 * x - 34.0 * v + 13.0 * a - 3.0 * j, 10.0 * v - 20.0 * x - 4.0 * a + j
-                m1, m2 = 60.0 * c5 + 180.0 * c6 + 378.0 * c7, 60.0 * c6 + 210.0 * c7
+                c4 = minus(15.0, v, 35.0 * x) + fused(5.0, a, -j)
+                c5 = minus(84.0, x, 39.0 * v) + minus(14.0, a, 3.0 * j)
+                c6 = minus(34.0, v, 70.0 * x) + minus(3.0, j, 13.0 * a)
+                c7 = minus(20.0, x, 10.0 * v) + minus(4.0, a, j)
+                m1, m2 = fused(60.0, c5, fused(180.0, c6, 378.0 * c7)), fused(60.0, c6, 210.0 * c7)
                 fourth = rate * rate * rate * rate
                 fifth = fourth * rate
                 sixth = fifth * rate
-                energy = 36.0 * j * j + m1 * m1 * (1.0 / 3.0) + m2 * m2 * 0.2 + c7 * c7 * 252.0
-                total += energy * (sixth * rate)
+                energy = fused(m1 * m1, 1.0 / 3.0, 36.0 * j * j) + fused(m2 * m2, 0.2, c7 * c7 * 252.0)
+                total = fused(energy, sixth * rate, total)
                 left4, left5, left6 = 24.0 * c4 * fourth, 120.0 * c5 * fifth, 720.0 * c6 * sixth
                 right4 = left4 + (120.0 * c5 + 360.0 * c6 + 840.0 * c7) * fourth
                 right5, right6 = left5 + (720.0 * c6 + 2520.0 * c7) * fifth, left6 + 5040.0 * c7 * sixth

@@ -23,7 +23,7 @@ TO_THE_BOUNDARY = 0.995
 SOLVED, STALLED, INFEASIBLE = 0, 1, 2
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _factor4(a, out):  # type: ignore[no-untyped-def]
     """Do the same for width 3, minimum jerk through fixed waypoints: all in scalars."""
     p0 = p1 = p2 = q0 = q1 = o0 = 0.0  # of the row before: inverted diagonal and the two beside it; and of those before
@@ -40,7 +40,7 @@ def _factor4(a, out):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def factor(a, out):  # type: ignore[no-untyped-def]
     """Factor a banded matrix, L L': a[i, t] is its entry (i, i - t); the diagonal of L is inverted. False if it fails.
 
@@ -67,7 +67,7 @@ def factor(a, out):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def substitute(factors, b):  # type: ignore[no-untyped-def]
     """Solve L L' x = b in place."""
     n, size = factors.shape
@@ -94,7 +94,7 @@ def substitute(factors, b):  # type: ignore[no-untyped-def]
             b[i - t] -= factors[i, t] * x
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def times(a, x, out):  # type: ignore[no-untyped-def]
     """Let out be A x for a symmetric banded matrix."""
     n, size = a.shape
@@ -122,7 +122,7 @@ def times(a, x, out):  # type: ignore[no-untyped-def]
         out[i] += total
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _add_rows(columns, values, weight, out):  # type: ignore[no-untyped-def]
     """Add G' diag(weight) G to a banded matrix."""
     count, wide = columns.shape
@@ -142,7 +142,7 @@ def _add_rows(columns, values, weight, out):  # type: ignore[no-untyped-def]
                     out[i, 0] += scaled * values[r, b]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _dot(columns, values, r, x):  # type: ignore[no-untyped-def]
     total = 0.0
     for a in range(columns.shape[1]):
@@ -151,7 +151,7 @@ def _dot(columns, values, r, x):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _dual(own, gradient, columns, values, upper, z, work):  # type: ignore[no-untyped-def]
     """Return the dual value, less the objective's constant, of the best multiple of z: a bound for all feasible y.
 

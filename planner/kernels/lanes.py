@@ -1,7 +1,8 @@
 """Eight numbers in a vector register, as a type of Numba with the few operations that the kernels need.
 
 LLVM's own vectorisers give up on these loops: they are short, and nothing tells that input and output do not overlap.
-The named operations round each on its own; the signs ``+ - * /`` may be fused, between lanes or lanes and a number.
+Every operation rounds once, also the signs ``+ - * /``, between lanes or lanes and a number; ``step`` and ``minus`` are
+there for products and sums in one. Nothing is left for LLVM to fuse as it likes: it would not do so everywhere alike.
 """
 
 import operator
@@ -15,7 +16,6 @@ from numba.extending import intrinsic, models, overload, register_model
 LANES = 8
 
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
-_FUSED = ("contract",)  # a product and a sum may become one instruction
 
 
 class _Lanes(types.Type):  # type: ignore[misc]
@@ -97,14 +97,32 @@ def product(typing: Any, x: Any, y: Any) -> Any:
     return _operation(lambda builder, x, y: builder.fmul(x, y), lanes)
 
 
+def _fused(negated: bool, *kinds: Any) -> Any:
+    """Return the generator of x * u + y, or y - x * u, with one rounding; of lanes or of numbers."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        wide = isinstance(signature.return_type, _Lanes)
+        args = [_everywhere(builder, v) if wide and v.type == ir.DoubleType() else v for v in args]
+        if negated:
+            args[0] = builder.fneg(args[0])
+        kind, name = args[0].type, f"llvm.fma.v{LANES}f64" if wide else "llvm.fma.f64"
+        module = builder.module
+        called = module.globals.get(name) or ir.Function(module, ir.FunctionType(kind, [kind] * 3), name)
+        return builder.call(called, args)
+
+    return (lanes if any(isinstance(k, _Lanes) for k in kinds) else types.float64)(*kinds), generate
+
+
 @intrinsic
 def step(typing: Any, x: Any, u: Any, y: Any) -> Any:
-    """Return x * u + y, rounded once where the machine can."""
+    """Return x * u + y, rounded once; each is lanes or a number."""
+    return _fused(False, x, u, y)
 
-    def build(builder: Any, x: Any, u: Any, y: Any) -> Any:
-        return builder.fadd(builder.fmul(x, u, flags=_FUSED), y, flags=_FUSED)
 
-    return _operation(build, types.float64, lanes)
+@intrinsic
+def minus(typing: Any, x: Any, u: Any, y: Any) -> Any:
+    """Return y - x * u, rounded once; each is lanes or a number."""
+    return _fused(True, x, u, y)
 
 
 @intrinsic
@@ -154,6 +172,20 @@ def root(typing: Any, x: Any) -> Any:
     return lanes(lanes), generate
 
 
+@intrinsic
+def added(typing: Any, x: Any) -> Any:
+    """Return the sum of the LANES numbers, by halves."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        x = args[0]
+        for half in (4, 2, 1):
+            indices = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [(r + half) % LANES for r in range(LANES)])
+            x = builder.fadd(x, builder.shuffle_vector(x, x, indices))
+        return builder.extract_element(x, ir.Constant(ir.IntType(32), 0))
+
+    return types.float64(lanes), generate
+
+
 def _sign(symbol: Any, instruction: str) -> None:
     """Let a sign of Python stand for an instruction between lanes, or lanes and a number."""
 
@@ -161,7 +193,7 @@ def _sign(symbol: Any, instruction: str) -> None:
     def operation(typing: Any, x: Any, y: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             pair = [_everywhere(builder, v) if v.type == ir.DoubleType() else v for v in args]
-            return getattr(builder, instruction)(*pair, flags=_FUSED)
+            return getattr(builder, instruction)(*pair)
 
         return lanes(x, y), generate
 

@@ -24,9 +24,9 @@ A = 1 and an infinite cap.
 import numpy as np
 from numba import njit
 
+from .lanes import minus
+from .lanes import step as fused
 from .path_jerk_rows import advance, begin_multipliers, curvature, forces, least_slack, reach, time_taken
-
-FAST = {"nnan", "ninf", "nsz", "reassoc", "contract", "arcp"}
 
 #: Part of the way to the nearest bound that a step goes.
 FRACTION = 0.995
@@ -61,73 +61,89 @@ def spline_maps(nodes, ratios, maps):  # type: ignore[no-untyped-def]
             maps[m - 1, r, 2] = 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy")
 def _forms(maps, y, width, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` (3 * width): mean, slope and curvature of every interval."""
     for k in range(len(maps)):
         y0, y1, y2 = y[k], y[k + 1], y[k + 2]
         for r in range(3):
-            out[r * width + k] = maps[k, r, 0] * y0 + maps[k, r, 1] * y1 + maps[k, r, 2] * y2
+            out[r * width + k] = fused(maps[k, r, 2], y2, fused(maps[k, r, 1], y1, maps[k, r, 0] * y0))
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy")
 def _factorise(h0, h1, h2):  # type: ignore[no-untyped-def]
     """Overwrite a pentadiagonal matrix with its L D L' factors; the diagonal holds 1 / D."""
-    d1 = d2 = l11 = l12 = l22 = 0.0  # of the row before, and of that before it
+    # o = l D and f = l D of the first and second diagonal, of the row before, and of that before it (f, l2 only)
+    o = l1 = f1 = l12 = f2 = l22 = 0.0
     for i in range(len(h0)):
-        d = h0[i] - l11 * l11 * d1 - l22 * l22 * d2
-        o = h1[i] - l11 * d1 * l12
+        d = minus(l1, o, minus(l22, f2, h0[i]))
+        o = minus(l12, o, h1[i])
         over = 1.0 / d
-        h0[i], h1[i] = over, o * over
-        far = h2[i] * over
-        h2[i] = far
-        l22, d2 = l12, d1
-        l11, l12, d1 = h1[i], far, d
+        l22, f2, f1 = l12, f1, h2[i]
+        l1, l12 = o * over, f1 * over
+        h0[i], h1[i], h2[i] = over, l1, l12
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy")
 def _solve(h0, h1, h2, x):  # type: ignore[no-untyped-def]
     """Overwrite x by the solution of the factorised system."""
     n = len(x)
-    one = two = 0.0
+    one = two = near = far = farther = 0.0
     for i in range(n):
-        t = x[i]
-        if i >= 1:
-            t -= h1[i - 1] * one
-        if i >= 2:
-            t -= h2[i - 2] * two
+        t = minus(near, one, minus(farther, two, x[i]))
+        near, far, farther = h1[i], h2[i], far
         one, two = t, one
         x[i] = t
     one = two = 0.0
     for i in range(n - 1, -1, -1):
-        t = x[i] * h0[i] - h1[i] * one - h2[i] * two
+        t = minus(h1[i], one, minus(h2[i], two, x[i] * h0[i]))
         one, two = t, one
         x[i] = t
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy")
 def _gathered(maps, by_interval, width, out):  # type: ignore[no-untyped-def]
     """Add forms by interval (3 * width) to a vector over the coefficients."""
-    for k in range(len(maps)):
+    m = len(maps)
+    x0 = x1 = 0.0  # what the intervals before leave for coefficients k and k + 1
+    for k in range(m):
         f0, f1, f2 = by_interval[k], by_interval[width + k], by_interval[2 * width + k]
-        for i in range(3):
-            out[k + i] += maps[k, 0, i] * f0 + maps[k, 1, i] * f1 + maps[k, 2, i] * f2
+        out[k] += fused(maps[k, 0, 0], f0, fused(maps[k, 1, 0], f1, fused(maps[k, 2, 0], f2, x0)))
+        x0 = fused(maps[k, 0, 1], f0, fused(maps[k, 1, 1], f1, fused(maps[k, 2, 1], f2, x1)))
+        x1 = fused(maps[k, 0, 2], f0, fused(maps[k, 1, 2], f1, maps[k, 2, 2] * f2))
+    out[m] += x0
+    out[m + 1] += x1
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy")
+def _times(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+    """Return the sum of three products."""
+    return fused(a2, b2, fused(a1, b1, a0 * b0))
+
+
+@njit(cache=True, error_model="numpy")
 def _assembled(maps, hess, width, h0, h1, h2):  # type: ignore[no-untyped-def]
     """Add M' H M of every interval to the bands."""
-    for k in range(len(maps)):
+    m = len(maps)
+    x0 = x1 = z0 = 0.0  # what the intervals before leave for h0[k], h0[k + 1] and h1[k]
+    for k in range(m):
         aa, ab, ac = hess[k], hess[width + k], hess[2 * width + k]
         bb, bc, cc = hess[3 * width + k], hess[4 * width + k], hess[5 * width + k]
-        for i in range(3):
-            a, b, c = maps[k, 0, i], maps[k, 1, i], maps[k, 2, i]
-            ra, rb, rc = aa * a + ab * b + ac * c, ab * a + bb * b + bc * c, ac * a + bc * b + cc * c
-            h0[k + i] += ra * a + rb * b + rc * c
-            if i < 2:
-                h1[k + i] += ra * maps[k, 0, i + 1] + rb * maps[k, 1, i + 1] + rc * maps[k, 2, i + 1]
-            if i < 1:
-                h2[k] += ra * maps[k, 0, 2] + rb * maps[k, 1, 2] + rc * maps[k, 2, 2]
+        a, b, c = maps[k, 0, 0], maps[k, 1, 0], maps[k, 2, 0]
+        a1, b1, c1 = maps[k, 0, 1], maps[k, 1, 1], maps[k, 2, 1]
+        a2, b2, c2 = maps[k, 0, 2], maps[k, 1, 2], maps[k, 2, 2]
+        ra, rb, rc = _times(aa, ab, ac, a, b, c), _times(ab, bb, bc, a, b, c), _times(ac, bc, cc, a, b, c)
+        h0[k] += x0 + _times(ra, rb, rc, a, b, c)
+        h1[k] += z0 + _times(ra, rb, rc, a1, b1, c1)
+        h2[k] += _times(ra, rb, rc, a2, b2, c2)
+        ra, rb, rc = _times(aa, ab, ac, a1, b1, c1), _times(ab, bb, bc, a1, b1, c1), _times(ac, bc, cc, a1, b1, c1)
+        x0 = x1 + _times(ra, rb, rc, a1, b1, c1)
+        z0 = _times(ra, rb, rc, a2, b2, c2)
+        ra, rb, rc = _times(aa, ab, ac, a2, b2, c2), _times(ab, bb, bc, a2, b2, c2), _times(ac, bc, cc, a2, b2, c2)
+        x1 = _times(ra, rb, rc, a2, b2, c2)
+    h0[m] += x0
+    h0[m + 1] += x1
+    h1[m] += z0
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,24 +7,23 @@ less work than fetching them. Row r's two sides are ``2 r`` (above) and ``2 r + 
 import numpy as np
 from numba import njit
 
-from .lanes import LANES, filled, larger, load, root, smaller, store
+from .lanes import LANES, added, filled, larger, load, minus, root, smaller, store
+from .lanes import step as fused
 
 #: Least part of the objective's curvature that is kept where the jolts take it away.
 CONVEX = 1e-2
 
 
 @njit(cache=True, error_model="numpy")
-def _form(e, at, width, a, b, c):  # type: ignore[no-untyped-def]
-    """Return the form whose first coefficients are at ``at``, of lanes a, b, c."""
-    return load(e, at) * a + load(e, at + width) * b + load(e, at + 2 * width) * c
+def _three(e0, e1, e2, a, b, c):  # type: ignore[no-untyped-def]
+    """Return the sum of three products."""
+    return fused(e2, c, fused(e1, b, e0 * a))
 
 
 @njit(cache=True, error_model="numpy")
-def _total(x):  # type: ignore[no-untyped-def]
-    """Return the sum of lanes."""
-    room = np.empty(LANES)
-    store(room, 0, x)
-    return room.sum()
+def _form(e, at, width, a, b, c):  # type: ignore[no-untyped-def]
+    """Return the form whose first coefficients are at ``at``, of lanes a, b, c."""
+    return _three(load(e, at), load(e, at + width), load(e, at + 2 * width), a, b, c)
 
 
 @njit(cache=True, error_model="numpy")
@@ -43,12 +42,12 @@ def least_slack(sizes, e, inverse, over_caps, abc):  # type: ignore[no-untyped-d
     for k in range(0, width, LANES):
         a, b, c = load(abc, k), load(abc, width + k), load(abc, 2 * width + k)
         phi = 1.0 / root(a)
-        least = smaller(one - a * load(over_caps, k), least)
+        least = smaller(minus(a, load(over_caps, k), one), least)
         for r in range(rows):
             value, free = _form(e, 3 * r * width + k, width, a, b, c), one if r < pushes else phi
             at = 2 * r * width + k
-            least = smaller(free - value * load(inverse, at), least)
-            least = smaller(free - value * load(inverse, at + width), least)
+            least = smaller(minus(value, load(inverse, at), free), least)
+            least = smaller(minus(value, load(inverse, at + width), free), least)
     return -_most(least * -1.0)
 
 
@@ -63,9 +62,9 @@ def begin_multipliers(sizes, e, inverse, over_caps, abc, mu, lam):  # type: igno
         for r in range(rows):
             value, free = _form(e, 3 * r * width + k, width, a, b, c), one if r < pushes else phi
             at = 2 * r * width + k
-            store(lam, at, aim / (free - value * load(inverse, at)))
-            store(lam, at + width, aim / (free - value * load(inverse, at + width)))
-        store(lam, 2 * rows * width + k, aim / (one - a * load(over_caps, k)))
+            store(lam, at, aim / minus(value, load(inverse, at), free))
+            store(lam, at + width, aim / minus(value, load(inverse, at + width), free))
+        store(lam, 2 * rows * width + k, aim / minus(a, load(over_caps, k), one))
 
 
 @njit(cache=True, error_model="numpy")
@@ -77,38 +76,39 @@ def curvature(sizes, e, inverse, over_caps, abc, steps, price, lam, grad, hess):
         a, b, c, h = load(abc, k), load(abc, width + k), load(abc, 2 * width + k), load(steps, k)
         phi = 1.0 / root(a)
         slope = phi / a * -0.5
-        cost = h * (b * b * price[1] + price[0])
+        cost = h * fused(b * b, price[1], filled(price[0]))
         bend = h * b * phi * price[1]
         store(grad, k, cost * slope)
         store(grad, width + k, bend * 2.0)
         store(grad, 2 * width + k, nothing)
         cap = load(over_caps, k)
-        aa = load(lam, 2 * rows * width + k) / (one - a * cap) * cap * cap
+        aa = load(lam, 2 * rows * width + k) / minus(a, cap, one) * cap * cap
         ab, bb = bend / a * -1.0, h * phi * (2.0 * price[1])
         ac = bc = cc = nothing
         free = cost
         for r in range(rows):
             at = 3 * r * width + k
             e0, e1, e2 = load(e, at), load(e, at + width), load(e, at + 2 * width)
-            value = e0 * a + e1 * b + e2 * c
+            value = _three(e0, e1, e2, a, b, c)
             at = 2 * r * width + k
             up, down = load(inverse, at), load(inverse, at + width)
             over, under = load(lam, at), load(lam, at + width)
             if r < pushes:
-                d = over / (one - value * up) * up * up + under / (one - value * down) * down * down
+                d = over / minus(value, up, one) * up * up
+                d = fused(under / minus(value, down, one) * down, down, d)
                 d0, d1 = d * e0, d * e1
-                aa = aa + d0 * e0
+                aa = fused(d0, e0, aa)
             else:
                 free = free - over - under
-                over, under = over / (phi - value * up), under / (phi - value * down)
-                s1 = (over * up + under * down) * slope
-                d = over * up * up + under * down * down
-                d0, d1 = d * e0 - s1, d * e1
-                aa = aa + (over + under) * slope * slope - s1 * e0 + d0 * e0
-            ab, ac = ab + d0 * e1, ac + d0 * e2
-            bb, bc, cc = bb + d1 * e1, bc + d1 * e2, cc + d * e2 * e2
+                over, under = over / minus(value, up, phi), under / minus(value, down, phi)
+                s1 = fused(over, up, under * down) * slope
+                d = fused(over * up, up, under * down * down)
+                d0, d1 = fused(d, e0, s1 * -1.0), d * e1
+                aa = fused(d0, e0, minus(s1, e0, fused((over + under) * slope, slope, aa)))
+            ab, ac = fused(d0, e1, ab), fused(d0, e2, ac)
+            bb, bc, cc = fused(d1, e1, bb), fused(d1, e2, bc), fused(d * e2, e2, cc)
         free = larger(free, cost * CONVEX)
-        store(hess, k, aa + free * phi / (a * a) * 0.75)
+        store(hess, k, fused(free * phi / (a * a), 0.75, aa))
         store(hess, width + k, ab)
         store(hess, 2 * width + k, ac)
         store(hess, 3 * width + k, bb)
@@ -119,7 +119,7 @@ def curvature(sizes, e, inverse, over_caps, abc, steps, price, lam, grad, hess):
 @njit(cache=True, error_model="numpy")
 def _cross(over, change, weight):  # type: ignore[no-untyped-def]
     """Return the product of the changes of slack (``over`` is 1 / slack) and multiplier that the affine step makes."""
-    return (weight * change * over + weight) * change * -1.0
+    return fused(weight * change, over, weight) * change * -1.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -134,23 +134,23 @@ def forces(sizes, e, inverse, over_caps, abc, affine, lam, target, out):  # type
         slope = phi / a * -0.5
         fall = slope * da
         cap = load(over_caps, k)
-        over = 1.0 / (one - a * cap)
+        over = 1.0 / minus(a, cap, one)
         f0 = (aim - _cross(over, da * cap * -1.0, load(lam, 2 * rows * width + k))) * over * cap * -1.0
         f1 = f2 = filled(0.0)
         for r in range(rows):
             at = 3 * r * width + k
             e0, e1, e2 = load(e, at), load(e, at + width), load(e, at + 2 * width)
-            value, change = e0 * a + e1 * b + e2 * c, e0 * da + e1 * db + e2 * dc
+            value, change = _three(e0, e1, e2, a, b, c), _three(e0, e1, e2, da, db, dc)
             at = 2 * r * width + k
             up, down = load(inverse, at), load(inverse, at + width)
             free, rise = (one, aim * 0.0) if r < pushes else (phi, fall)
-            over, under = 1.0 / (free - value * up), 1.0 / (free - value * down)
-            over = (aim - _cross(over, rise - change * up, load(lam, at))) * over
-            under = (aim - _cross(under, rise - change * down, load(lam, at + width))) * under
-            pull = over * up + under * down
+            over, under = 1.0 / minus(value, up, free), 1.0 / minus(value, down, free)
+            over = (aim - _cross(over, minus(change, up, rise), load(lam, at))) * over
+            under = (aim - _cross(under, minus(change, down, rise), load(lam, at + width))) * under
+            pull = fused(over, up, under * down)
             if r >= pushes:
-                f0 = f0 + (over + under) * slope
-            f0, f1, f2 = f0 - pull * e0, f1 - pull * e1, f2 - pull * e2
+                f0 = fused(over + under, slope, f0)
+            f0, f1, f2 = minus(pull, e0, f0), minus(pull, e1, f1), minus(pull, e2, f2)
         store(out, k, f0)
         store(out, width + k, f1)
         store(out, 2 * width + k, f2)
@@ -177,25 +177,26 @@ def reach(sizes, e, inverse, over_caps, abc, affine, step, corrects, lam, target
             if r < rows:
                 at = 3 * r * width + k
                 e0, e1, e2 = load(e, at), load(e, at + width), load(e, at + 2 * width)
-                value, change = e0 * a + e1 * b + e2 * c, e0 * da + e1 * db + e2 * dc
-                before = e0 * fa + e1 * fb + e2 * fc
+                value, change = _three(e0, e1, e2, a, b, c), _three(e0, e1, e2, da, db, dc)
+                before = _three(e0, e1, e2, fa, fb, fc)
                 free, fall, early = (one, aim * 0.0, aim * 0.0) if r < pushes else (phi, slope * da, slope * fa)
             else:
                 value, change, before, free, fall, early = a, da, fa, one, aim * 0.0, aim * 0.0
             for side in range(2 if r < rows else 1):
                 at = (2 * r + side) * width + k
                 bound = load(inverse, at) if r < rows else load(over_caps, k)
-                slack, weight, moved = free - value * bound, load(lam, at), fall - change * bound
+                slack, weight, moved = minus(value, bound, free), load(lam, at), minus(change, bound, fall)
                 over = 1.0 / slack
                 if corrects:
-                    grown = (aim - _cross(over, early - before * bound, weight) - weight * moved) * over - weight
+                    cross = _cross(over, minus(before, bound, early), weight)
+                    grown = fused(minus(weight, moved, aim - cross), over, weight * -1.0)
                     dual = larger(grown / weight * -1.0, dual)
                 else:
-                    grown = weight * moved * over * -1.0 - weight
-                    dual = larger(moved * over + 1.0, dual)
+                    grown = minus(weight * moved, over, weight * -1.0)
+                    dual = larger(fused(moved, over, one), dual)
                 primal = larger(moved * over * -1.0, primal)
-                linear, square = linear + weight * moved + slack * grown, square + moved * grown
-    sums[0], sums[1], sums[2], sums[3] = _most(primal), _most(dual), _total(linear), _total(square)
+                linear, square = fused(slack, grown, fused(weight, moved, linear)), fused(moved, grown, square)
+    sums[0], sums[1], sums[2], sums[3] = _most(primal), _most(dual), added(linear), added(square)
 
 
 @njit(cache=True, error_model="numpy")
@@ -210,14 +211,14 @@ def advance(sizes, e, inverse, over_caps, abc, affine, step, lam, target, length
         da, db, dc = load(step, k), load(step, width + k), load(step, 2 * width + k)
         phi = 1.0 / root(a)
         slope = phi / a * -0.5
-        new = a + da * length
+        new = fused(da, length, a)
         later = 1.0 / root(new)
         for r in range(rows + 1):
             if r < rows:
                 at = 3 * r * width + k
                 e0, e1, e2 = load(e, at), load(e, at + width), load(e, at + 2 * width)
-                value, change = e0 * a + e1 * b + e2 * c, e0 * da + e1 * db + e2 * dc
-                before = e0 * fa + e1 * fb + e2 * fc
+                value, change = _three(e0, e1, e2, a, b, c), _three(e0, e1, e2, da, db, dc)
+                before = _three(e0, e1, e2, fa, fb, fc)
                 free, fall, early = (one, aim * 0.0, aim * 0.0) if r < pushes else (phi, slope * da, slope * fa)
             else:
                 value, change, before, free, fall, early = a, da, fa, one, aim * 0.0, aim * 0.0
@@ -225,16 +226,17 @@ def advance(sizes, e, inverse, over_caps, abc, affine, step, lam, target, length
             for side in range(2 if r < rows else 1):
                 at = (2 * r + side) * width + k
                 bound = load(inverse, at) if r < rows else load(over_caps, k)
-                slack, weight, moved = free - value * bound, load(lam, at), fall - change * bound
+                slack, weight, moved = minus(value, bound, free), load(lam, at), minus(change, bound, fall)
                 over = 1.0 / slack
-                grown = (aim - _cross(over, early - before * bound, weight) - weight * moved) * over - weight
-                weight = weight + grown * length
+                cross = _cross(over, minus(before, bound, early), weight)
+                grown = fused(minus(weight, moved, aim - cross), over, weight * -1.0)
+                weight = fused(grown, length, weight)
                 store(lam, at, weight)
-                gap = gap + weight * (ahead - (value + change * length) * bound)
+                gap = fused(weight, minus(fused(change, length, value), bound, ahead), gap)
         store(abc, k, new)
-        store(abc, width + k, b + db * length)
-        store(abc, 2 * width + k, c + dc * length)
-    return _total(gap)
+        store(abc, width + k, fused(db, length, b))
+        store(abc, 2 * width + k, fused(dc, length, c))
+    return added(gap)
 
 
 @njit(cache=True, error_model="numpy")
@@ -244,5 +246,5 @@ def time_taken(steps, abc, price):  # type: ignore[no-untyped-def]
     total = filled(0.0)
     for k in range(0, width, LANES):
         b = load(abc, width + k)
-        total = total + load(steps, k) * (b * b * price[1] + price[0]) / root(load(abc, k))
-    return _total(total)
+        total = total + load(steps, k) * fused(b * b, price[1], filled(price[0])) / root(load(abc, k))
+    return added(total)

@@ -51,7 +51,7 @@ def _number(typing: Any, array: Any, index: Any) -> Any:
     return types.float64(array, types.intp), generate
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _minors(times, begin, end, c, w, at):  # type: ignore[no-untyped-def]
     """Write steps and minors of the gaps begin … end - 1 to w[at …]; c: minors, step before, extremes of the ratio.
 
@@ -71,11 +71,11 @@ def _minors(times, begin, end, c, w, at):  # type: ignore[no-untyped-def]
         w[at + _MINORS + 2 * _ROW], w[at + _MINORS + 3 * _ROW], w[at + _MINORS + 4 * _ROW] = q, r, d
         at += 1
         # the short sums side by side keep the chain from knot to knot short
-        c0 = (432.0 * one + 8640.0 * p) + (2160.0 * r + 8640.0 * q)
-        c1 = (240.0 * d + (one + 128.0 * p)) + (56.0 * q + 8.0 * r)
-        c2 = (120.0 * d + (one + 80.0 * p)) + (42.0 * q + 7.0 * r)
-        c3 = (45.0 * d + (one + 45.0 * p)) + (30.0 * q + 6.0 * r)
-        c4 = (432.0 * d + (one + 192.0 * p)) + (72.0 * q + 9.0 * r)
+        c0 = step(p, 8640.0, 432.0 * one) + step(q, 8640.0, 2160.0 * r)
+        c1 = step(d, 240.0, step(p, 128.0, one)) + step(q, 56.0, 8.0 * r)
+        c2 = step(d, 120.0, step(p, 80.0, one)) + step(q, 42.0, 7.0 * r)
+        c3 = step(d, 45.0, step(p, 45.0, one)) + step(q, 30.0, 6.0 * r)
+        c4 = step(d, 432.0, step(p, 192.0, one)) + step(q, 72.0, 9.0 * r)
         if i & 3 == 3:
             scale = 1.0 / c4
             c0, c1, c2, c3, c4 = c0 * scale, c1 * scale, c2 * scale, c3 * scale, 1.0

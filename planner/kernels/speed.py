@@ -77,3 +77,53 @@ def speeds(coefficients, piece, left, width, nodes, weights, out):  # type: igno
         out[0, q], out[1, q], out[2, q], out[4, q] = coarse, fine, lowest, highest
         out[3, q] = min(values[3 * LANES], values[3 * LANES + 1])
         out[5, q] = 64.0 * EPS * np.sqrt(noise)
+
+
+@njit(cache=True, error_model="numpy")
+def length(coefficients, nodes, weights, low, most_pieces, most):  # type: ignore[no-untyped-def]
+    """Return the integral of the norm over all pieces, halving intervals where ``planner.quadrature.integral`` would.
+
+    Parameters
+    ----------
+    coefficients, nodes, weights
+        As above.
+    low : float
+        Where the norm falls to this part of its largest value inside an interval it may have a kink.
+    most_pieces, most : int
+        Intervals looked at together, and in all.
+    """
+    pieces = coefficients.shape[1]
+    piece, left, width = np.arange(pieces), np.zeros(pieces), np.ones(pieces)
+    total, seen = 0.0, 0
+    for level in range(48):
+        count, found = len(piece), np.empty((6, len(piece)))
+        speeds(coefficients, piece, left, width, nodes, weights, found)
+        whole = 0.0
+        for q in range(count):
+            whole += found[1, q] * width[q]
+        floor = 1e-11 * max(total + whole, 1e-300) / np.sqrt(count)
+        rough, again, smooth = np.zeros(count, np.bool_), 0, 0.0
+        for q in range(count):
+            coarse, fine, highest = found[0, q], found[1, q], found[4, q]
+            allowed = max(floor, found[5, q] * width[q])
+            kink = found[2, q] < low * highest and found[3, q] > 1e-9 * highest and width[q] * highest > 10.0 * allowed
+            if abs(coarse * width[q] - fine * width[q]) > allowed or kink:
+                rough[q] = True
+                again += 1
+            else:
+                smooth += fine * width[q]
+        seen += count
+        if again == 0 or level == 47 or again > most_pieces or seen > most:
+            return total + whole
+        total += smooth
+        halves, begins, extents = np.empty(2 * again, np.int64), np.empty(2 * again), np.empty(2 * again)
+        k = 0
+        for q in range(count):
+            if rough[q]:
+                half = 0.5 * width[q]
+                halves[k] = halves[again + k] = piece[q]  # alike next to alike: what their nodes need is found once
+                extents[k] = extents[again + k] = half
+                begins[k], begins[again + k] = left[q], left[q] + half
+                k += 1
+        piece, left, width = halves, begins, extents
+    return total

@@ -65,7 +65,7 @@ def _prior(k, fixed, minors):  # type: ignore[no-untyped-def]
 # prediction, e_left = J e_right + G new, m_right = Taylor's m_left + K new.
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _step2(ratio, h, c, gains, i):  # type: ignore[no-untyped-def]
     one, p = c[0], c[1] * ratio
     x = one * (1.0 / 3.0) + p
@@ -77,7 +77,7 @@ def _step2(ratio, h, c, gains, i):  # type: ignore[no-untyped-def]
     gains[i, 2] = (p + 0.5 * one) * rate
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _step3(ratio, h, c, gains, i):  # type: ignore[no-untyped-def]
     square = ratio * ratio
     one, p, q, r, d = c[0], c[1] * (square * ratio), c[2] * square, c[3] * ratio, c[4] * (square * square)
@@ -103,7 +103,7 @@ def _step3(ratio, h, c, gains, i):  # type: ignore[no-untyped-def]
         gains[i, 4], gains[i, 5], gains[i, 6], gains[i, 7] = rate, 0.0, rate, 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def _step4(ratio, h, c, gains, i, work):  # type: ignore[no-untyped-def]
     r2 = ratio * ratio
     r3, r4 = r2 * ratio, r2 * r2

@@ -249,6 +249,13 @@ def worst(coefficients, rate, row, gain, shift):  # type: ignore[no-untyped-def]
             where, end = start + degree * stride, count * dims if counts[m] else 0
             _bounds(source, where, stride, end, degree, plain[m], m, rates, sides[m], reach[m], begin * dims, best[m])
 
+    least = np.zeros((orders, dims))  # what the badness of a place next to a limit's own value may be wrong by
+    for m in range(orders):
+        for d in range(dims):
+            for k in range(2):
+                for s in range(shift.shape[2]):
+                    if shift[k, m, s, d] > -np.inf:
+                        least[m, d] = max(least[m, d], SLACK * abs(shift[k, m, s, d]))
     limits = best  # from here on: above which badness a side may be worse than the worst found so far
     for m in range(orders):
         if not counts[m]:
@@ -258,7 +265,7 @@ def worst(coefficients, rate, row, gain, shift):  # type: ignore[no-untyped-def]
                 most[m, d] = max(most[m, d], best[m, p * dims + d])
             if most[m, d] > -np.inf:
                 # a little less, that the place itself, and an equal one before it, are still found
-                most[m, d] = min(most[m, d], LARGEST) - 2.0 * TIE * abs(most[m, d]) - TINY
+                most[m, d] = min(most[m, d], LARGEST) - 2.0 * TIE * abs(most[m, d]) - TINY - least[m, d]
             for p in range(held):
                 limits[m, p * dims + d] = _limit(most[m, d])
         degree = max(n - m, 0)

@@ -15,6 +15,7 @@ from .ruckig import RUCKIG
 from .septic_spline import SEPTIC_SPLINE
 from .time_optimal_nlp import TIME_OPTIMAL_NLP
 from .time_optimal_path import TIME_OPTIMAL_PATH
+from .time_optimal_waypoints import TIME_OPTIMAL_WAYPOINTS
 from .time_scaled import TIME_SCALED
 from .toppra import TOPPRA
 from .trapezoidal import TRAPEZOIDAL
@@ -38,6 +39,7 @@ METHODS: dict[str, Method] = {
         TIME_SCALED,
         TOPPRA,
         TIME_OPTIMAL_PATH,
+        TIME_OPTIMAL_WAYPOINTS,
         TIME_OPTIMAL_NLP,
     )
 }

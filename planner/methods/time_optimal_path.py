@@ -38,6 +38,7 @@ class TimeOptimalPathOptions(PathOptions):
         le=MAX_VALUE,
         description="linear path only: corners are rounded, nowhere further from the polyline than this in any joint "
         "(default: the motion stops at corners)",
+        json_schema_extra={"unit": "unit"},
     )
 
     @property

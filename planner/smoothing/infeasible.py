@@ -141,7 +141,9 @@ def _pressing(posed: Posed, proof: NoPoint) -> list[tuple[Key, int, float]]:
         total[key] = total.get(key, 0.0) + float(z)
         if float(z) > where.get(key, (-1.0, 0, 0.0))[0]:
             where[key] = (float(z), int(i), float(u))
-    ranked = sorted(total, key=lambda k: -total[k])
+    most = max(total.values())
+    # alike but for rounding, as in a problem that mirrors itself: the earliest segment, from above
+    ranked = sorted(total, key=lambda k: (-round(total[k] / most, 6) if most else 0.0, k[1], k[0], -k[2]))
     return [(key, *where[key][1:]) for key in ranked if total[key] >= PRESSES * total[ranked[0]]]
 
 

@@ -4,27 +4,34 @@ ruckig compares with absolute tolerances and refuses limits above 1e9, so that a
 Each joint gets a unit of length of its own and all share a unit of time; only time couples the joints.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import Infeasible, SolverFailed
-from ..limits import QUANTITIES, Limit
+from ..deadline import Deadline
+from ..errors import Infeasible
+from ..limits import QUANTITIES, Limit, magnitude
 from ..trajectory import Trajectory
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 #: In scaled units every move takes about one, so limits above such a cap hardly bind; where ruckig fails with the first
 #: cap (it takes limits up to 1e9, but mixes of scales trouble it) the next is tried.
 CAPS = (9e8, 1e8, 1e6, 1e4)
 #: Numbers in this range need no scaling.
 PLAIN = (1e-3, 1e5)
+#: Phases of a joint: two of braking and seven of motion.
+PHASES = 9
 
 
 @dataclass(frozen=True, eq=False)
-class Segment:
-    """From one state to another under limits; arrays (D,), jerk may be infinite."""
+class Legs:
+    """S motions, each from one state to another under limits; arrays (S, D), jerk may be infinite.
+
+    ``least`` (S,): how long each takes at least, s.
+    """
 
     p0: Array
     v0: Array
@@ -35,143 +42,179 @@ class Segment:
     velocity: Limit
     acceleration: Limit
     jerk: Array
-    least: float = 0.0
+    least: Array
+
+    def __len__(self) -> int:
+        return len(self.p0)
 
     @property
-    def rests(self) -> bool:
-        """Whether it starts and ends at rest."""
-        return not (self.v0.any() or self.a0.any() or self.v1.any() or self.a1.any())
+    def rests(self) -> NDArray[np.bool_]:
+        """Whether each starts and ends at rest, (S,)."""
+        return ~np.asarray(np.stack([self.v0, self.a0, self.v1, self.a1]).any(axis=(0, 2)))
+
+    @property
+    def still(self) -> NDArray[np.bool_]:
+        """Whether nothing moves, (S,)."""
+        return np.asarray(self.rests & (self.p0 == self.p1).all(axis=1))
+
+    def chosen(self, index: Indices) -> "Legs":
+        """Return some of them."""
+        velocity, acceleration = (Limit(x.lower[index], x.upper[index]) for x in (self.velocity, self.acceleration))
+        p0, v0, a0, p1, v1, a1, jerk, least = (
+            x[index] for x in (self.p0, self.v0, self.a0, self.p1, self.v1, self.a1, self.jerk, self.least)
+        )
+        return Legs(p0, v0, a0, p1, v1, a1, velocity, acceleration, jerk, least)
 
 
-def time_optimal(segment: Segment) -> Trajectory:
-    """Return the shortest motion (at least ``segment.least`` long) as cubic pieces, starting at time 0.
+def profiles(legs: Legs, deadline: Deadline | None = None) -> tuple[Array, Array]:
+    """Return the shortest durations (S,), NaN where ruckig finds none, and every joint's phases, (S, D, 10, 5).
+
+    A phase is duration, position from the leg's start, velocity, acceleration and jerk at its start. Two are of
+    braking, seven of motion, some take no time; the last has the end state and holds.
 
     Raises
     ------
-    SolverFailed
-        ruckig finds no motion.
+    TimeLimit
+        The deadline has passed.
     """
-    second, unit = _units(segment)
-    attempts = [(second, unit, cap) for cap in CAPS]
-    if _plain(segment, second):
-        attempts.insert(0, (1.0, np.ones_like(unit), CAPS[0]))
-    for second, unit, cap in attempts:
-        scaled = _scaled(segment, second, unit, cap)
-        try:
-            duration, phases = _ruckig(scaled)
+    from ..kernels.phases import integrate
+
+    durations, rows, second, unit = _solved(legs, deadline, True)
+    steps = rows[:, :, 0] * second[:, None, None]
+    stepped = np.isinf(legs.jerk)
+    rates = rows[:, :, 1] * (unit / second[:, None] ** np.where(stepped, 2.0, 3.0))[:, :, None]
+    start, end = np.stack([legs.v0, legs.a0]), np.stack([legs.p1 - legs.p0, legs.v1, legs.a1])
+    return durations, integrate(steps, rates, stepped, start, end)
+
+
+def shortest(legs: Legs, deadline: Deadline | None = None) -> Array:
+    """Return the shortest durations alone, (S,), NaN where ruckig finds none."""
+    return _solved(legs, deadline, False)[0]
+
+
+def _solved(legs: Legs, deadline: Deadline | None, moved: bool) -> tuple[Array, Array, Array, Array]:
+    """Return durations (s), the phases' durations and rates (S, D, 2, 9) as ruckig has them, and their units.
+
+    The units are of time, (S,), and of length, (S, D). Without ``moved`` the phases are not asked for.
+    """
+    from ..kernels.phases import units
+
+    count, dims = legs.p0.shape
+    v, a = legs.velocity, legs.acceleration
+    move = legs.p1 - legs.p0
+    numbers = np.stack([legs.v0, legs.a0, move, legs.v1, legs.a1, v.lower, v.upper, a.lower, a.upper, legs.jerk])
+    second, unit, plain, still = units(numbers, *PLAIN)
+    time, length = np.where(plain, 1.0, second), np.where(plain[:, None], 1.0, unit)
+    durations, rows = np.where(still, legs.least, np.nan), np.zeros((count, dims, 2, PHASES))
+    for attempt, cap in enumerate((CAPS[0], *CAPS)):
+        now = np.flatnonzero(np.isnan(durations))
+        if len(now) == 0:
             break
-        except SolverFailed:
-            if cap == CAPS[-1]:
-                raise
-    pieces = _pieces(duration, phases)
-    coefficients = pieces.coefficients * unit
-    coefficients[-1] += segment.p0
-    return Trajectory(pieces.breaks * second, coefficients)
+        if attempt > 0:
+            time[now], length[now] = second[now], unit[now]
+        _ruckig(numbers, legs.least, now, time, length, cap, deadline, durations, rows if moved else None)
+    return durations, rows, time, length
 
 
-def _plain(s: Segment, second: float) -> bool:
-    """Return whether all numbers are of ordinary size as they stand."""
-    numbers = [s.p1 - s.p0, s.velocity.upper, s.velocity.lower, s.acceleration.upper, s.acceleration.lower, s.jerk]
-    sizes = np.abs(np.concatenate([*numbers, s.v0, s.v1, s.a0, s.a1]))
-    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
-    return bool(sizes.min() >= PLAIN[0] and sizes.max() <= PLAIN[1] and PLAIN[0] <= second <= 5e3)
+def _ruckig(
+    numbers: Array,
+    least: Array,
+    chosen: Indices,
+    second: Array,
+    unit: Array,
+    cap: float,
+    deadline: Deadline | None,
+    durations: Array,
+    rows: Array | None,
+) -> None:
+    """Write durations (S,), s, and the phases' durations and rates (S, D, 2, 9) of those chosen for which one is found.
 
-
-def _units(s: Segment) -> tuple[float, Array]:
-    """Return the unit of time, about the slowest joint's duration, and each joint's unit of length."""
-    move = np.abs(s.p1 - s.p0)
-    v = np.minimum(s.velocity.upper, -s.velocity.lower)
-    a = np.minimum(s.acceleration.upper, -s.acceleration.lower)
-    speed, push = np.maximum(np.abs(s.v0), np.abs(s.v1)), np.maximum(np.abs(s.a0), np.abs(s.a1))
-    durations = np.stack(
-        [move / v, np.sqrt(move / a), np.cbrt(move / s.jerk), speed / a, np.sqrt(speed / s.jerk), push / s.jerk]
-    )
-    second = float(durations.max())
-    second = second if second > 0 else 1.0
-    unit = np.maximum(np.maximum(move, speed * second), push * second**2)
-    return second, np.where(unit > 0, unit, 1.0)
-
-
-def _scaled(s: Segment, second: float, unit: Array, cap: float) -> Segment:
-    v, a, j = second / unit, second**2 / unit, second**3 / unit
-    return replace(
-        s,
-        p0=np.zeros_like(s.p0),
-        v0=s.v0 * v,
-        a0=s.a0 * a,
-        p1=(s.p1 - s.p0) / unit,
-        v1=s.v1 * v,
-        a1=s.a1 * a,
-        velocity=Limit(np.maximum(s.velocity.lower * v, -cap), np.minimum(s.velocity.upper * v, cap)),
-        acceleration=Limit(np.maximum(s.acceleration.lower * a, -cap), np.minimum(s.acceleration.upper * a, cap)),
-        jerk=np.where(np.isfinite(s.jerk), np.minimum(s.jerk * j, cap), np.inf),
-        least=s.least / second,
-    )
-
-
-def _ruckig(s: Segment) -> tuple[float, Array]:
-    """Return the duration and every joint's phases, (D, 10, 5): duration, position, velocity, acceleration, jerk.
-
-    Two of braking, seven of motion, and the rest at the end; some take no time.
+    A rate is the jerk, or, where that is not limited, the acceleration.
     """
     import ruckig
 
-    dims = len(s.p0)
-    given = ruckig.InputParameter(dims)
-    given.current_position, given.target_position = s.p0.tolist(), s.p1.tolist()
-    given.current_velocity, given.target_velocity = s.v0.tolist(), s.v1.tolist()
-    given.current_acceleration, given.target_acceleration = s.a0.tolist(), s.a1.tolist()
-    given.max_velocity, given.min_velocity = s.velocity.upper.tolist(), s.velocity.lower.tolist()
-    given.max_acceleration, given.min_acceleration = s.acceleration.upper.tolist(), s.acceleration.lower.tolist()
-    given.max_jerk = s.jerk.tolist()
-    if s.least > 0:
-        given.minimum_duration = s.least
-    made = ruckig.Trajectory(dims)
-    try:
-        result = ruckig.Ruckig(dims).calculate(given, made)
-    except (ruckig.RuckigError, ValueError) as error:
-        raise SolverFailed("ruckig", str(error).strip().splitlines()[0][:300]) from None
-    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise SolverFailed("ruckig", str(result))
-    phases = np.zeros((dims, 10, 5))
-    for d, profile in enumerate(made.profiles[0]):
-        brake = profile.brake
-        phases[d, :2] = np.array([brake.t, brake.p, brake.v, brake.a, brake.j]).T
-        phases[d, 2:9] = np.array([profile.t, profile.p[:7], profile.v[:7], profile.a[:7], profile.j]).T
-    phases[:, 9, 0], phases[:, 9, 1] = np.inf, s.p1
-    return float(made.duration), phases
+    from ..kernels.phases import scaled
+
+    dims = numbers.shape[2]
+    solver, given, made = ruckig.Ruckig(dims), ruckig.InputParameter(dims), ruckig.Trajectory(dims)
+    given.current_position = [0.0] * dims
+    flat: list[float] = []
+    good: list[int] = []
+    listed = scaled(numbers, second, unit, chosen, cap).tolist()
+    for i, state, longer in zip(chosen.tolist(), listed, (least[chosen] / second[chosen]).tolist(), strict=True):
+        if deadline is not None:
+            deadline.left()
+        given.current_velocity, given.current_acceleration = state[0], state[1]
+        given.target_position, given.target_velocity, given.target_acceleration = state[2], state[3], state[4]
+        given.min_velocity, given.max_velocity = state[5], state[6]
+        given.min_acceleration, given.max_acceleration = state[7], state[8]
+        given.max_jerk = jerk = state[9]
+        given.minimum_duration = longer if longer > 0.0 else None
+        try:
+            result = solver.calculate(given, made)
+        except (ruckig.RuckigError, ValueError):
+            continue
+        if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+            continue
+        durations[i] = made.duration * second[i]
+        if rows is None:
+            continue
+        good.append(i)
+        for d, profile in enumerate(made.profiles[0]):
+            stepped = jerk[d] == np.inf
+            flat += profile.t
+            flat += profile.a[:7] if stepped else profile.j
+            braking = profile.brake
+            if braking.duration > 0.0:
+                rows[i, d, :, :2] = braking.t, braking.a if stepped else braking.j
+    if rows is not None:
+        rows[good, :, :, 2:] = np.array(flat).reshape(-1, dims, 2, 7)
 
 
-def _pieces(duration: float, phases: Array) -> Trajectory:
-    """Return the joints' phases on common breaks; breaks closer than rounding are one."""
-    ends = np.cumsum(phases[:, :, 0], axis=1)
-    found = np.unique(np.append(ends[:, :9], 0.0))
-    found = found[found < duration * (1.0 - 1e-12)]
-    breaks = np.append(found[np.append(True, np.diff(found) > 1e-12 * duration)], duration)
-    middles = 0.5 * (breaks[:-1] + breaks[1:])
-    phase = (ends[:, :9, None] <= middles).sum(axis=1)  # (D, K)
-    starts = np.concatenate([np.zeros((len(ends), 1)), ends[:, :9]], axis=1)
-    u = breaks[:-1] - np.take_along_axis(starts, phase, axis=1)
-    p, v, a, j = (np.take_along_axis(phases[:, :, k], phase, axis=1) for k in range(1, 5))
-    powers = (p + u * (v + u * (a / 2 + u * j / 6)), v + u * (a + u * j / 2), (a + u * j) / 2, j / 6)
-    return Trajectory.from_powers(breaks, np.stack(powers).transpose(0, 2, 1))
+def joined(durations: Array, phases: Array, origin: Array) -> tuple[Trajectory, Array]:
+    """Return the motions one after the other from time 0 on breaks common to all joints, and when each starts or ends.
+
+    Parameters
+    ----------
+    durations : (S,)
+        Those that take no time leave nothing.
+    phases : (S, D, n, 5)
+        See ``profiles``; any number of them.
+    origin : (S, D)
+        What positions count from.
+    """
+    from ..kernels.phases import merge
+
+    times = np.concatenate([[0.0], np.cumsum(durations)])
+    if not times[-1] > 0.0:
+        return Trajectory.hold(origin[0], 0.0, 0.0), times
+    return Trajectory.from_powers(*merge(times, np.ascontiguousarray(phases), np.ascontiguousarray(origin))), times
 
 
-def refuse_overshoot(segment: Segment, motion: Trajectory, index: int) -> None:
+def slowed(phases: Array, factor: Array) -> Array:
+    """Return the phases of motions that take ``factor`` (S,) times as long."""
+    return np.asarray(phases * np.power(factor[:, None, None, None], [1.0, 0.0, -1.0, -2.0, -3.0]))
+
+
+def refuse_overshoot(legs: Legs, phases: Array) -> None:
     """Refuse where the asked end state itself leads beyond a limit, so that ruckig brakes outside of it."""
-    if segment.rests:
-        return
-    found = motion.extrema(4)
-    for order, limit in ((1, segment.velocity), (2, segment.acceleration)):
-        over = np.maximum(found.high[order] - limit.upper, limit.lower - found.low[order]) / limit.scale()
-        if over.max() > 1e-9:
-            piece, joint = (int(i) for i in np.unravel_index(int(np.argmax(over)), over.shape))
-            high = found.high[order][piece, joint] > limit.upper[joint]
-            raise Infeasible(
-                f"the state asked at an end leads beyond the {QUANTITIES[order]} limit of joint {joint}",
-                joint=joint,
-                quantity=QUANTITIES[order],
-                segment=index,
-                bound=float((limit.upper if high else limit.lower)[joint]),
-                needed=float((found.high if high else found.low)[order][piece, joint]),
-            )
+    from ..kernels.phases import extremes
+
+    moving = np.flatnonzero(~legs.rests)
+    low, high = extremes(np.ascontiguousarray(phases[moving]))
+    for row, index in enumerate(moving.tolist()):
+        for order, limit in ((1, legs.velocity), (2, legs.acceleration)):
+            lower, upper = limit.lower[index], limit.upper[index]
+            below, above = low[order, row], high[order, row]
+            over = np.maximum(above - upper, lower - below) / magnitude(lower, upper)
+            if over.max() > 1e-9:
+                joint = int(np.argmax(over))
+                beyond = above[joint] > upper[joint]
+                raise Infeasible(
+                    f"the state asked at an end leads beyond the {QUANTITIES[order]} limit of joint {joint}",
+                    joint=joint,
+                    quantity=QUANTITIES[order],
+                    segment=index,
+                    bound=float((upper if beyond else lower)[joint]),
+                    needed=float((above if beyond else below)[joint]),
+                )

@@ -14,7 +14,7 @@ from api.errors import KINDS, LARGEST
 def service() -> Iterator[TestClient]:
     """The service without a socket, once its kernels are compiled; what it does not catch is raised."""
     with TestClient(create_app()) as client:
-        for _ in range(3000):
+        for _ in range(6000):
             if client.get("/readyz").status_code == 200:
                 break
             time.sleep(0.1)

@@ -74,8 +74,8 @@ def test_out_csv(run, file, tmp_path):
 
 
 def test_out_in_a_format_not_there(run, file, tmp_path):
-    err = run("plan", file(GOOD), "--out", str(tmp_path / "x.npz"), code=2)
-    assert ".json, .csv" in err
+    err = run("plan", file(GOOD), "--out", str(tmp_path / "x.yaml"), code=2)
+    assert ".json, .msgpack, .csv" in err
 
 
 def test_out_that_cannot_be_written_is_named(run, file, tmp_path):
@@ -171,7 +171,7 @@ def test_a_bug_is_one_line_too(run, file, monkeypatch):
     def broken(*_):
         raise RuntimeError("boom")
 
-    monkeypatch.setattr("api.__main__.answer_plan", broken)
+    monkeypatch.setattr("api.__main__.draft_plan", broken)
     assert "boom" in run("plan", file(GOOD), code=1)
 
 

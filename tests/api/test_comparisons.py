@@ -126,6 +126,6 @@ def test_too_many_samples_for_one_row(service):
     assert row["error"]["type"] == "/errors/too_large"
 
 
-def test_only_json(service, problem):
+def test_only_trees(service, problem):
     response = service.post(COMPARE, json=BODY | {"methods": "all"}, headers={"accept": "text/csv"})
-    assert problem(response, "not_acceptable")["available"] == ["application/json"]
+    assert problem(response, "not_acceptable")["available"] == ["application/json", "application/msgpack"]

@@ -15,6 +15,7 @@ from api import AsyncClient, Client
 from api.__main__ import main
 from api.answers import PlanReply
 from api.app import create_app
+from api.formats import FORMATS
 from planner import Infeasible, InvalidRequest, PlanRequest, Recorded, Trajectory, plan, sample
 from planner.types import Sampling
 
@@ -338,7 +339,7 @@ def test_the_document_describes_it(service):
     operation = service.get("/openapi.json").json()["paths"][RETIME]["post"]
     example = operation["requestBody"]["content"]["application/json"]["example"]
     assert service.post(RETIME, json=example).status_code == 200
-    assert set(operation["responses"]["200"]["content"]) == {"application/json", "text/csv", ROS2}
+    assert set(operation["responses"]["200"]["content"]) == set(FORMATS)
 
 
 def test_command_line(tmp_path, capsys, service):
@@ -349,7 +350,7 @@ def test_command_line(tmp_path, capsys, service):
     assert printed.startswith("method: ") and "\ncertified (exact)" in printed
     assert main(["retime", str(file), "--out", str(out)]) == 0
     assert out.read_bytes() == service.post(RETIME, json=body({"samples": SAMPLES})).content
-    assert main(["retime", str(file), "--out", str(tmp_path / "x.npz")]) == 2
+    assert main(["retime", str(file), "--out", str(tmp_path / "x.yaml")]) == 2
     file.write_text(json.dumps(body({})))
     assert main(["retime", str(file)]) == 2
     assert "/trajectory" in capsys.readouterr().err

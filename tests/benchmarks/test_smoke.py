@@ -11,6 +11,9 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 
+#: All comparisons in their quick form: two minutes.
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory):
@@ -145,7 +148,18 @@ def test_our_laws_along_a_path_keep_the_limits_and_are_near_the_best(timings):
     assert min(float(r["gap"]) for r in ours if r["gap"]) >= -1e-9
 
 
+def test_motions_through_waypoints_have_their_peers_and_keep_everything(out):
+    with (out / "waypoints.csv").open(encoding="utf-8") as file:
+        motions = list(csv.DictReader(file))
+    assert {r["part"] for r in motions} == {"quality", "speed", "program", "growth", "random problems"}
+    assert {r["goal"] for r in motions} == {""}
+    ours = [r for r in motions if r["missed"]]
+    assert len(ours) >= 12 and max(float(r["beyond"]) for r in ours) <= 1e-6
+    assert max(float(r["missed"]) for r in ours) < 1e-9
+    assert "## Through waypoints\n" in (out / "report.md").read_text(encoding="utf-8")
+
+
 def test_the_report_tells_the_machine_and_splits_a_request(out):
     report = (out / "report.md").read_text(encoding="utf-8")
     assert "Measured on" in report and "toppra 0." in report
-    assert "| ur5e_jerk | ruckig |" in report
+    assert "| ur5e_jerk | time_optimal_waypoints |" in report

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner import METHODS, PlanRequest, plan
@@ -21,9 +21,13 @@ CURVES = (
 )
 TIMED = (*CURVES, "minimum_jerk")
 BY_CONTROL_POINTS = ("bezier", "nurbs")
-CHOSEN = ("trapezoidal", "ruckig", "time_scaled", "toppra", "time_optimal_path")
-#: Their grids are refined where it pays, by comparisons that rounding can turn; passes run one way first.
-REFINED = ("toppra", "time_optimal_path")
+CHOSEN = ("trapezoidal", "ruckig", "time_scaled", "toppra", "time_optimal_path", "time_optimal_waypoints")
+#: How far apart the durations of requests that say the same may be where that is more than rounding. Grids are refined
+#: where it pays, by comparisons that rounding can turn; a program is solved to 1e-5.
+REFINED = {"toppra": 2e-3, "time_optimal_path": 2e-3, "time_optimal_waypoints": 1e-4}
+#: The same for a motion and its reversal along a path with a jerk limit: the timing is a local optimum, found by passes
+#: that run one way first. Of 1,500 random problems 4 were more than 0.2 % longer one way, the worst (seed 125) 0.58 %.
+REVERSED = 1e-2
 assert {*TIMED, *CHOSEN, *BY_CONTROL_POINTS, "time_optimal_nlp"} == set(METHODS)
 
 
@@ -34,7 +38,8 @@ def make(method, rng, jerk=True):
     if method in TIMED:
         return points, {"times": np.cumsum(rng.uniform(0.2, 2, n))}
     limits = {"velocity": rng.uniform(0.5, 2, dims), "acceleration": rng.uniform(0.5, 5, dims)}
-    if jerk and method in ("ruckig", "time_scaled", "time_optimal_path") and rng.random() < 0.7:
+    optional = method in ("ruckig", "time_scaled", "time_optimal_path") and rng.random() < 0.7
+    if jerk and (optional or method == "time_optimal_waypoints"):
         limits["jerk"] = rng.uniform(5, 50, dims)
     return points, {"limits": limits}
 
@@ -85,11 +90,12 @@ def test_time_scaling_of_limits(method, seed):
     slow = {q: x / factor ** orders[q] for q, x in given_["limits"].items()}
     a = plan(PlanRequest.of(points, **given_), method).trajectory
     b = plan(PlanRequest.of(points, limits=slow), method).trajectory
-    assert b.duration == pytest.approx(a.duration * factor, rel=2e-3 if method in REFINED else 1e-6)
+    assert b.duration == pytest.approx(a.duration * factor, rel=REFINED.get(method, 1e-6))
 
 
 @pytest.mark.parametrize("method", [*TIMED, *CHOSEN])
 @given(SEEDS)
+@example(125)
 def test_reversal_mirrors(method, seed):
     rng = np.random.default_rng(seed)
     points, given_ = make(method, rng)
@@ -97,7 +103,8 @@ def test_reversal_mirrors(method, seed):
     if "times" in given_:
         given_ = {"times": -given_["times"][::-1]}
     b = plan(PlanRequest.of(points[::-1], **given_), method).trajectory
-    assert b.duration == pytest.approx(a.duration, rel=2e-3 if method in REFINED else 1e-9)
+    jerk = method == "time_optimal_path" and "jerk" in given_["limits"]
+    assert b.duration == pytest.approx(a.duration, rel=REVERSED if jerk else REFINED.get(method, 1e-9))
     if method not in REFINED:
         at = np.linspace(0, 1, 50)
         there = a(np.clip(a.start + at * a.duration, a.start, a.end))
@@ -116,7 +123,7 @@ def test_joint_permutation_permutes(method, seed):
     if "limits" in given_:
         given_ = {"limits": {q: x[order] for q, x in given_["limits"].items()}}
     b = plan(PlanRequest.of(points[:, order], **given_), method).trajectory
-    assert b.duration == pytest.approx(a.duration, rel=2e-3 if method in REFINED else 1e-9)
+    assert b.duration == pytest.approx(a.duration, rel=REFINED.get(method, 1e-9))
     if method in REFINED:
         return
     at = np.linspace(0, 1, 50)

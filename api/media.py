@@ -1,0 +1,12 @@
+"""Media types, as the HTTP contract names them."""
+
+JSON = "application/json"
+MSGPACK = "application/msgpack"
+ARROW = "application/vnd.apache.arrow.stream"
+CSV = "text/csv"
+NPZ = "application/x-npz"
+ROS2 = "application/vnd.ros2.joint-trajectory+json"
+PLOTLY = "application/vnd.plotly+json"
+MARKDOWN = "text/markdown"
+PROBLEM = "application/problem+json"
+PROMETHEUS = "text/plain"
