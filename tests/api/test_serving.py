@@ -9,12 +9,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Thread
 from typing import IO
 
 import httpx2
+import psutil
 import pytest
 
 from api.__main__ import main
@@ -24,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 LONG = {
     "waypoints": [[0, 0], [1, 2], [2, 0], [3, 1]],
     "method": "time_optimal_nlp",
-    "options": {"stations": 300},
+    "options": {"stations": 1000},
     "limits": {"velocity": 1, "acceleration": 2, "jerk": 10},
     "include": ["polynomial"],
 }
@@ -135,18 +136,36 @@ def test_slow_clients_are_told_or_closed(service):
             assert connection.recv(65536)[: len(answer) or 1] == answer
 
 
+@contextmanager
+def solving(process: subprocess.Popen[str], client: httpx2.Client, asking: Asking) -> Iterator[None]:
+    """Hold the solvers once one of them is at work, so that it is at work for as long as the test needs."""
+    while "waywright_solvers_busy 0.0\n" in client.get("/metrics").text:
+        assert asking.is_alive(), asking.answer and asking.answer.text[:300]
+    descendants = psutil.Process(process.pid).children(recursive=True)
+    for each in descendants:
+        each.suspend()
+    try:
+        yield
+    finally:
+        for each in descendants:
+            with suppress(psutil.Error):
+                each.resume()
+
+
 def test_sigterm_lets_what_has_begun_finish(service):
     """The last test of the process."""
     process, client = service
     asking = Asking(client, "/v1/trajectories", LONG)
-    time.sleep(0.5)
-    assert asking.is_alive(), asking.answer and asking.answer.text[:300]
-    process.send_signal(signal.SIGTERM)
-    time.sleep(0.1)
-    assert client.get("/readyz").status_code == 503
-    refused = client.post("/v1/trajectories", json=LONG)
-    assert refused.status_code == 503 and refused.headers["connection"] == "close"
-    assert json.loads(refused.content)["reason"] == "stopping"
+    with solving(process, client, asking):
+        assert asking.is_alive(), asking.answer and asking.answer.text[:300]
+        process.send_signal(signal.SIGTERM)
+        until = time.monotonic() + 10
+        while client.get("/readyz").status_code != 503 and time.monotonic() < until:
+            time.sleep(0.01)
+        refused = client.post("/v1/trajectories", json=LONG)
+        assert refused.status_code == 503 and refused.headers["connection"] == "close"
+        assert json.loads(refused.content)["reason"] == "stopping"
+        assert asking.is_alive()
     asking.join(90)
     assert asking.answer is not None and asking.answer.status_code == 200, asking.answer and asking.answer.text[:300]
     assert process.wait(10) == 0
@@ -178,18 +197,15 @@ def test_a_signal_ends_an_idle_service_at_once_and_without_a_word(sig, ready, tm
 def test_the_end_comes_in_time_or_at_the_second_signal(second):
     with serving(drain_seconds="60" if second else "1") as (process, client):
         until_ready(client)
-        body = {k: v for k, v in LONG.items() if k not in ("method", "options")}
-        rows = [{"method": LONG["method"], "options": {"stations": 500 + i}} for i in range(20)]
-        asking = Asking(client, "/v1/comparisons", body | {"methods": rows, "timeout": 60})
-        time.sleep(1.0)
-        assert asking.is_alive(), asking.answer and asking.answer.text[:300]
-        began = time.monotonic()
-        process.send_signal(signal.SIGTERM)
-        if second:
-            time.sleep(0.3)
+        asking = Asking(client, "/v1/trajectories", LONG)
+        with solving(process, client, asking):
+            began = time.monotonic()
             process.send_signal(signal.SIGTERM)
-        assert process.wait(20) == (1 if second else 0)
-        assert time.monotonic() - began < 8
+            if second:
+                time.sleep(0.3)
+                process.send_signal(signal.SIGTERM)
+            assert process.wait(20) == (1 if second else 0)
+            assert time.monotonic() - began < 8
         asking.join(10)
         assert asking.answer is None or asking.answer.status_code >= 500
 
