@@ -9,8 +9,10 @@ from hypothesis import HealthCheck, settings
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
+# The same examples in each run, so that a change is judged by what it changes; WAYWRIGHT_RANDOM=1 draws new ones.
 settings.register_profile(
     "waywright",
+    derandomize="WAYWRIGHT_RANDOM" not in os.environ,
     deadline=None,
     print_blob=True,
     max_examples=int(os.environ.get("WAYWRIGHT_EXAMPLES", "25")),

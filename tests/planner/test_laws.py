@@ -25,10 +25,16 @@ CHOSEN = ("trapezoidal", "ruckig", "time_scaled", "toppra", "time_optimal_path",
 #: How far apart the durations of requests that say the same may be where that is more than rounding. Grids are refined
 #: where it pays, by comparisons that rounding can turn; a program is solved to 1e-5.
 REFINED = {"toppra": 2e-3, "time_optimal_path": 2e-3, "time_optimal_waypoints": 1e-4}
-#: The same for a motion and its reversal along a path with a jerk limit: the timing is a local optimum, found by passes
-#: that run one way first. Of 1,500 random problems 4 were more than 0.2 % longer one way, the worst (seed 125) 0.58 %.
-REVERSED = 1e-2
+#: The same along a path with a jerk limit: the timing is a local optimum, and rounding can turn which. Of 1,500 random
+#: problems 4 were more than 0.2 % longer in reverse, the worst (seed 125) 0.58 %; scaled in time, seed 152 0.38 %.
+LOCAL = 1e-2
 assert {*TIMED, *CHOSEN, *BY_CONTROL_POINTS, "time_optimal_nlp"} == set(METHODS)
+
+
+def alike(method, given_, otherwise):
+    """Return how far apart durations of the same may be."""
+    local = method == "time_optimal_path" and "jerk" in given_.get("limits", {})
+    return LOCAL if local else REFINED.get(method, otherwise)
 
 
 def make(method, rng, jerk=True):
@@ -81,6 +87,7 @@ def test_time_scaling_of_times(method, seed):
 
 @pytest.mark.parametrize("method", CHOSEN)
 @given(SEEDS)
+@example(152)
 def test_time_scaling_of_limits(method, seed):
     """Limits v / a, a / a², j / a³ make the same motion a times as long."""
     rng = np.random.default_rng(seed)
@@ -90,7 +97,7 @@ def test_time_scaling_of_limits(method, seed):
     slow = {q: x / factor ** orders[q] for q, x in given_["limits"].items()}
     a = plan(PlanRequest.of(points, **given_), method).trajectory
     b = plan(PlanRequest.of(points, limits=slow), method).trajectory
-    assert b.duration == pytest.approx(a.duration * factor, rel=REFINED.get(method, 1e-6))
+    assert b.duration == pytest.approx(a.duration * factor, rel=alike(method, given_, 1e-6))
 
 
 @pytest.mark.parametrize("method", [*TIMED, *CHOSEN])
@@ -103,8 +110,7 @@ def test_reversal_mirrors(method, seed):
     if "times" in given_:
         given_ = {"times": -given_["times"][::-1]}
     b = plan(PlanRequest.of(points[::-1], **given_), method).trajectory
-    jerk = method == "time_optimal_path" and "jerk" in given_["limits"]
-    assert b.duration == pytest.approx(a.duration, rel=REVERSED if jerk else REFINED.get(method, 1e-9))
+    assert b.duration == pytest.approx(a.duration, rel=alike(method, given_, 1e-9))
     if method not in REFINED:
         at = np.linspace(0, 1, 50)
         there = a(np.clip(a.start + at * a.duration, a.start, a.end))
@@ -123,7 +129,7 @@ def test_joint_permutation_permutes(method, seed):
     if "limits" in given_:
         given_ = {"limits": {q: x[order] for q, x in given_["limits"].items()}}
     b = plan(PlanRequest.of(points[:, order], **given_), method).trajectory
-    assert b.duration == pytest.approx(a.duration, rel=REFINED.get(method, 1e-9))
+    assert b.duration == pytest.approx(a.duration, rel=alike(method, given_, 1e-9))
     if method in REFINED:
         return
     at = np.linspace(0, 1, 50)
