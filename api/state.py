@@ -5,7 +5,8 @@ import gc
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from .engine.engine import Engine, beside
+from .engine.beside import beside
+from .engine.engine import Engine
 from .engine.turns import Turns
 from .engine.warm import warm_quick
 from .observe.metrics import Metrics

@@ -3,15 +3,10 @@
 import asyncio
 import logging
 import math
-import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TypeVar
-
-import pebble
 
 from planner import TimeLimit
 
@@ -21,13 +16,8 @@ from .slot import Slot, context
 
 log = logging.getLogger("waywright.api")
 
-T = TypeVar("T")
-
 #: Bytes of a body after which a solver is replaced, for the memory that it leaves behind.
 LARGE = 2**20
-
-#: Seconds after its deadline at which a job is given up whatever its pool says.
-LOST = 0.1
 
 #: Seconds that solvers have to be gone when the service stops.
 STOPPING = 5.0
@@ -130,7 +120,7 @@ class Engine:
         slots = [*self._slots, *([] if self._spare is None else [self._spare])]
         self._slots.clear()
         with suppress(TimeoutError):
-            await asyncio.wait_for(asyncio.gather(*(beside(slot.discard) for slot in slots)), STOPPING)
+            await asyncio.wait_for(asyncio.gather(*(slot.discard() for slot in slots)), STOPPING)
 
     async def solve(self, job: Job, limit: float) -> Solved:
         """Solve a job within ``limit`` s from now; cancelling kills it.
@@ -140,8 +130,8 @@ class Engine:
         Refusal
             ``overloaded``: the queue is full, no solver came free in time, or two solvers crashed on it.
         """
-        began, crashes, losses = time.perf_counter(), 0, 0
-        while crashes < 2 and losses <= self.workers:
+        began = time.perf_counter()
+        for _ in range(2):
             slot = await self._take(limit - (time.perf_counter() - began))
             queued = time.perf_counter() - began
             if queued >= limit:  # it came free too late
@@ -151,9 +141,7 @@ class Engine:
                 outcome = await self._run(slot, replace(job, spent=job.spent + queued), limit - queued)
                 return Solved(outcome, queued)
             except _Crashed:
-                crashes += 1
-            except _Lost:
-                losses += 1
+                continue
         raise self._overloaded("crashed", "the solvers crashed on this request")
 
     # -- slots -------------------------------------------------------------------------------------------------------
@@ -199,13 +187,13 @@ class Engine:
         began, reason = time.perf_counter(), "cancelled"
         self.running += 1
         try:
-            future = asyncio.wrap_future(slot.submit(job, max(limit, 0.0)))
-            outcome = await asyncio.wait_for(future, max(limit, 0.0) + GRACE + LOST)
+            async with asyncio.timeout(max(limit, 0.0) + 2 * GRACE):
+                outcome = await slot.solve(job)
             self._mean += 0.1 * (time.perf_counter() - began - self._mean)
             reason = "recycled" if slot.solved >= self.recycle or len(job.raw) > LARGE else ""
             return outcome
-        except pebble.ProcessExpired as error:
-            if error.exitcode == -ALARM:  # it ended itself: see jobs.solve
+        except EOFError:
+            if await slot.exit_code() == -ALARM:  # it ended itself: see jobs.solve
                 reason = "timeout"
                 return failed(TimeLimit(glimpsed_limit(job)), job)
             reason = "crashed"
@@ -213,9 +201,6 @@ class Engine:
         except TimeoutError:
             reason = "timeout"
             return failed(TimeLimit(round(limit + job.spent, 6)), job)
-        except (RuntimeError, OSError) as error:  # the pool broke: its solver died before it began
-            reason = "lost"
-            raise _Lost from error
         finally:
             self.running -= 1
             if reason:
@@ -228,14 +213,14 @@ class Engine:
         log.log(logging.DEBUG if reason == "recycled" else logging.WARNING, "a solver is replaced: %s", reason)
         self._slots.discard(slot)
         self.restarts[reason] += 1
-        beside(slot.discard)
+        slot.discard()
         if self._closed:
             return
         spare, self._spare = self._spare, None
         if spare is not None and spare.alive:
             self._enter(spare)
         elif spare is not None:
-            beside(spare.discard)
+            spare.discard()
             self._spawn()
         self._spawn()
 
@@ -257,13 +242,13 @@ class Engine:
         while not self._closed:
             slot = Slot(self._context)
             try:
-                slot.pid = await asyncio.wrap_future(await beside(slot.begin))
+                await slot.begin()
             except asyncio.CancelledError:
-                beside(slot.discard)
+                slot.discard()
                 raise
             except Exception:
                 log.exception("a solver did not start")
-                beside(slot.discard)
+                slot.discard()
                 await asyncio.sleep(PAUSE)
                 continue
             self._enter(slot)
@@ -277,29 +262,3 @@ class Engine:
 
 class _Crashed(Exception):
     """The solver died under its job."""
-
-
-class _Lost(Exception):
-    """The solver was dead before its job began."""
-
-
-def beside(work: Callable[[], T]) -> "asyncio.Future[T]":
-    """Run blocking work in a thread that nobody waits for at exit."""
-    loop = asyncio.get_running_loop()
-    future: asyncio.Future[T] = loop.create_future()
-
-    def settle(value: T | None, error: BaseException | None) -> None:
-        if not future.done():
-            future.set_result(value) if error is None else future.set_exception(error)  # type: ignore[arg-type]
-
-    def run() -> None:
-        value, error = None, None
-        try:
-            value = work()
-        except BaseException as caught:
-            error = caught
-        with suppress(RuntimeError):  # the loop is closed
-            loop.call_soon_threadsafe(settle, value, error)
-
-    threading.Thread(target=run, daemon=True).start()
-    return future

@@ -31,7 +31,7 @@ from . import lanes
 
 log = logging.getLogger("waywright.api")
 
-#: Seconds beyond a job's time limit after which its process is killed: it has been asked to end by then.
+#: Seconds beyond a job's time limit after which its process ends itself; after twice as many it is killed.
 GRACE = 0.05
 
 #: The signal by which it then ends itself, even in native code; 0 where there is none.
