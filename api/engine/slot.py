@@ -10,7 +10,7 @@ import os
 import pickle
 import signal
 import socket
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from functools import partial
 from multiprocessing.context import BaseContext
@@ -133,7 +133,7 @@ class Slot:
         """Return how a solver ended that is no more: the number of a signal, negative; None if nobody knows."""
         if self._life is None:
             return None
-        with suppress(TimeoutError):
+        with suppress(TimeoutError, CancelledError):  # nobody knows yet; it was told to
             error = await beside(partial(self._life.exception, SURE))
             return error.exitcode if isinstance(error, pebble.ProcessExpired) else None
         return None

@@ -4,10 +4,12 @@ import asyncio
 import json
 import os
 import signal
+import socket
 import time
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import ormsgpack
 import pytest
 
@@ -15,6 +17,8 @@ from api.draft import Draft
 from api.engine import lanes
 from api.engine.engine import Engine
 from api.engine.jobs import Failed, Job, glimpsed_limit, solve
+from api.engine.line import Line, tell
+from api.engine.slot import Slot
 from api.engine.turns import Turns
 from api.errors import Refusal
 from api.formats import written
@@ -233,6 +237,74 @@ def test_time_in_the_queue_counts():
         return refused.value
 
     assert running()(scenario).data["reason"] == "expired"
+
+
+def test_whoever_is_being_served_at_the_end_is_told():
+    async def scenario(engine):
+        busy = asyncio.create_task(engine.solve(job(LONG), 30.0))
+        while not engine.running:
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.05)
+        await engine.stop()
+        with pytest.raises(Refusal) as refused:
+            await asyncio.wait_for(busy, 5)
+        return refused.value.data["reason"]
+
+    assert running()(scenario) == "stopping"
+
+
+def test_a_solver_that_does_not_start_is_started_again(monkeypatch, caplog):
+    """It dies before it says that it is warm; the next one does not."""
+    monkeypatch.setattr("api.engine.engine.PAUSE", 0.01)
+    begin, begun = Slot.begin, []
+
+    async def begins(self):
+        if not begun:
+            schedule = self._pool.schedule
+            self._pool.schedule = lambda _, args: schedule(_dies, args=args)
+        begun.append(self)
+        await begin(self)
+
+    monkeypatch.setattr(Slot, "begin", begins)
+
+    async def scenario(engine):
+        while len(begun) < 3:
+            await asyncio.sleep(0.02)
+        return (await engine.solve(job(LIMITED), 30.0)).outcome
+
+    assert isinstance(running()(scenario), Draft)
+    assert [record.message for record in caplog.records] == ["a solver did not start"]
+
+
+def _dies(line):
+    os._exit(3)
+
+
+def test_messages_of_any_size_in_any_pieces():
+    sent = [None, {"x": 1}, b"y" * 3_000_000, np.arange(400_000.0), "z"]
+
+    async def main():
+        here, there = socket.socketpair()
+        line = Line()
+        assert not line.open
+        await asyncio.get_running_loop().create_connection(lambda: line, sock=here)
+        found = []
+        for message in sent:
+            answer = line.answer()
+            telling = asyncio.get_running_loop().run_in_executor(None, tell, there, message)
+            found.append(await answer)
+            await telling
+        last = line.answer()
+        there.close()
+        with pytest.raises(EOFError):
+            await last
+        assert not line.open
+        with pytest.raises(EOFError):
+            await line.answer()
+        return found
+
+    for one, other in zip(asyncio.run(main()), sent, strict=True):
+        assert type(one) is type(other) and np.array_equal(one, other)
 
 
 def test_solvers_are_recycled():
