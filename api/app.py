@@ -97,9 +97,11 @@ async def _http_error(request: Request, error: Exception) -> Response:
     if error.status_code == 404:
         refusal = Refusal("not_found", f"there is nothing at {path}")
     elif error.status_code == 405:
-        allowed = (error.headers or {}).get("Allow", "")
+        verbs = (error.headers or {}).get("Allow", "").split(", ")
+        verbs += ["HEAD"] if "GET" in verbs and "HEAD" not in verbs else []  # answered by the middleware
+        allowed = ", ".join(verbs)
         detail = f"{path} does not take {request.method[:20]}; it takes {allowed}"
-        refusal = Refusal("method_not_allowed", detail, {"allowed": allowed.split(", ")}, {"Allow": allowed})
+        refusal = Refusal("method_not_allowed", detail, {"allowed": verbs}, {"Allow": allowed})
     else:
         phrase = HTTPStatus(error.status_code).phrase
         code = "internal" if error.status_code >= 500 else "invalid_request"
