@@ -21,15 +21,14 @@ from .types import TOLERANCE, Check, Note, PlanRequest
 
 Array = NDArray[np.float64]
 
-#: Follows a path that the usual method refuses.
-SECOND = "time_optimal_nlp"
+#: Times a path, and follows one that this refuses.
+USUAL, SECOND = "time_optimal_path", "time_optimal_nlp"
 #: Slower than this, relative to the fastest sample, a velocity is a stop: it has no direction.
 STOPPED = 1e-3
-
-
-def timing_method(limits: Limits) -> str:
-    """Return the id of the method that times a path under these limits."""
-    return "time_optimal_path"
+#: Positions of at most so many decimals are looked at for being rounded; in a dense record most of whose highest
+#: differences that the limits see are below so many units of the last one, the path is mostly rounding. (Measured: at 5
+#: units the timing is up to 12 % slower than along the path itself, at 2 it takes 1.4 to 6 times as long.)
+DECIMALS, UNITS, DENSE = 9, 8.0, 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +74,7 @@ def retime(
     A ``Trajectory`` is followed exactly; the answer's ``waypoint_times`` are when its breaks are passed. Samples are
     all passed, at the ``waypoint_times``: the path is the natural C2 cubic spline over centripetal knots or, where
     velocities were sent, the quintic spline of least squared jerk that has their directions as tangents. Equal
-    neighbours are one.
+    neighbours are one. A dense record whose digits are rounded makes a rough path; a note says so (``rounded``).
 
     Parameters
     ----------
@@ -111,6 +110,8 @@ def retime(
             timeout=deadline.left(),
             bound=bound,
         )
+        if isinstance(trajectory, Recorded) and tolerance is None:
+            route = replace(route, notes=(*route.notes, *_rough(trajectory.position, request.limits)))
         made = _told(_fastest(request, route, deadline), route)
     except InvalidRequest as error:
         raise _own_fields(error, samples) from None
@@ -184,6 +185,24 @@ def _of_samples(recorded: Recorded, tolerance: float | None, deadline: Deadline)
     return _Route(chosen, curve, curve.breaks, tuple(notes), kept, check)
 
 
+def _rough(points: Array, limits: Limits) -> tuple[Note, ...]:
+    """Return a note if the path is rough from rounding: within a tolerance of the record it is much faster."""
+    unit = next((10.0**-k for k in range(DECIMALS + 1) if _whole(points * 10.0**k)), None)
+    if unit is None or len(points) < DENSE:
+        return ()
+    bends = np.abs(np.diff(points, n=2 if limits.jerk is None else 3, axis=0)).max(axis=1)
+    bends = bends[bends > 0.5 * unit]
+    if not len(bends) or np.median(bends) > UNITS * unit:
+        return ()
+    told = f"rounded to {unit:g}, the positions make a rough path that slows the motion: tolerance {unit:g} smooths it"
+    return (Note("rounded", told),)
+
+
+def _whole(values: Array) -> bool:
+    """Return whether all are whole numbers, but for what the product of two rounded numbers is off."""
+    return bool((np.abs(values - np.rint(values)) <= 1e-7 + 1e-15 * np.abs(values)).all())
+
+
 def _paces(recorded: Recorded) -> Array:
     """Return the speed sent for every sample, (M,), relative to the fastest one or to the mean of the motion."""
     assert recorded.velocity is not None
@@ -237,7 +256,7 @@ def _fastest(request: PlanRequest, route: _Route, deadline: Deadline) -> Plan:
     """Return the plan along the route that takes least time: the usual method's, or the caller's own law, scaled."""
     found: list[Plan] = []
     refused: list[PlannerError] = []
-    ids = [timing_method(request.limits), *(["time_scaled"] if route.rests else [])]
+    ids = [USUAL, *(["time_scaled"] if route.rests else [])]
     for id in ids:
         try:
             found.append(plan(replace(request, timeout=deadline.left()), id, route.options()))

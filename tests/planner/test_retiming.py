@@ -18,7 +18,7 @@ from planner import (
 )
 from planner.deadline import Deadline
 from planner.fitting import smoothed
-from planner.retiming import timing_method
+from planner.retiming import USUAL
 
 LIMITS = {"velocity": 2.0, "acceleration": 5.0}
 WAYPOINTS = np.array([[0.0, 0.0], [1, 2], [2, 3], [1, 1]])
@@ -65,7 +65,7 @@ def test_never_slower_than_the_own_timing_slowed(motion):
             scaled = plan(request, "time_scaled", {"path": {"polynomial": polynomial}})
             made = retime(path, limits=LIMITS | jerk)
             assert made.trajectory.duration <= scaled.trajectory.duration * (1 + 1e-12)
-            assert made.method in ("time_scaled", timing_method(request.limits))
+            assert made.method in ("time_scaled", USUAL)
 
 
 def test_a_rational_curve_stays_one():
@@ -172,6 +172,23 @@ def test_a_smoother_path_is_shorter_in_time():
     taught = Recorded.of(u, np.stack([u, np.sin(u)], axis=1) + rng.uniform(-0.01, 0.01, (300, 2)))
     durations = [retime(taught, limits=LIMITS, tolerance=t).trajectory.duration for t in (0.0, 0.011, 0.05)]
     assert durations[0] > 2 * durations[1] and durations[1] > durations[2]
+
+
+@pytest.mark.parametrize("limits", [LIMITS, LIMITS | {"jerk": 40.0}])
+def test_a_rounded_record_is_told_and_its_tolerance_helps(limits):
+    u = np.linspace(0, 3, 600)
+    exact = np.stack([u, np.sin(u)], axis=1)
+
+    def retimed(position, **given):
+        return retime(Recorded.of(u, position), limits=limits, **given)
+
+    smooth, coarse = retimed(exact), retimed(np.round(exact, 4))
+    told = [n.message for n in coarse.notes if n.code == "rounded"]
+    assert len(told) == 1 and "tolerance 0.0001 " in told[0]
+    helped = retimed(np.round(exact, 4), tolerance=1e-4)
+    assert helped.trajectory.duration < 1.1 * smooth.trajectory.duration < coarse.trajectory.duration
+    for quiet in (smooth, helped, retimed(np.round(exact, 9))):
+        assert "rounded" not in codes(quiet)
 
 
 def test_what_cannot_be_smoothed_is_passed():
