@@ -121,7 +121,7 @@ class Settings:
 
 
 #: Names that other parts of the project read.
-_ELSEWHERE = {f"{PREFIX}BROWSER", f"{PREFIX}EXAMPLES"}
+_ELSEWHERE = {f"{PREFIX}{name}" for name in ("BROWSER", "EXAMPLES", "RANDOM", "SEEDS")}
 
 
 def _numbers(cls: type, environment: Mapping[str, str]) -> dict[str, Any]:
