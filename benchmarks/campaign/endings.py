@@ -7,7 +7,7 @@ import time
 import psutil
 
 from .bodies import STEADY, slow
-from .service import Service
+from .service import Service, runs
 from .state import State
 from .wire import Reply, ask, http
 
@@ -62,7 +62,7 @@ async def _disconnects(service: Service, state: State) -> None:
             continue
         writer.transport.abort()
         began = time.perf_counter()
-        while _runs(solver) and time.perf_counter() - began < 5.0:
+        while runs(solver) and time.perf_counter() - began < 5.0:
             await asyncio.sleep(0.005)
         state.data["gone"].append(round(time.perf_counter() - began, 4))
         reply = Reply()
@@ -73,13 +73,6 @@ async def _disconnects(service: Service, state: State) -> None:
             await asyncio.sleep(0.05)
         if reply.status != 200:
             state.fail(f"after a client went away a right request got {reply.status} {reply.body[:200]!r}")
-
-
-def _runs(process: psutil.Process) -> bool:
-    try:
-        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
-    except psutil.Error:
-        return False
 
 
 async def _stopped(own: Service, state: State) -> None:
@@ -102,7 +95,7 @@ async def _stopped(own: Service, state: State) -> None:
     state.data["codes"].append(-999 if code is None else code)
     state.data["ended"].append(round(time.perf_counter() - answered, 3))
     await asyncio.sleep(0.3)
-    if any(_runs(p) for p in family):
+    if any(runs(p) for p in family):
         state.fail("a solver outlived the service")
     if own.tracebacks():
         state.fail(f"{own.tracebacks()} tracebacks in the log: see {own.log}")

@@ -9,7 +9,7 @@ from contextlib import suppress
 import psutil
 
 from .bodies import STEADY, slow
-from .service import Service, spent
+from .service import Service, runs, spent
 from .state import State
 from .wire import Reply, ask, http
 
@@ -76,7 +76,7 @@ async def _stopped(service: Service, state: State) -> None:
     state.data["told"].append(round(max(reply.seconds for reply in replies) - LIMIT, 4))
     state.data["free"].append(round(max(free - usual, 0.0) - LIMIT, 4))
     for _ in range(100):
-        if not any(p.is_running() and p.status() != psutil.STATUS_ZOMBIE for p in victims):
+        if not any(runs(victim) for victim in victims):
             break
         await asyncio.sleep(0.05)
     else:

@@ -232,6 +232,14 @@ class Service:
         return self._bad
 
 
+def runs(process: psutil.Process) -> bool:
+    """Tell whether a process is there, and more than a name in the table."""
+    try:
+        return bool(process.is_running() and process.status() != psutil.STATUS_ZOMBIE)
+    except psutil.Error:
+        return False
+
+
 def spent(process: psutil.Process) -> float:
     """Return the computing time of a process, s; 0 if it is gone."""
     try:

@@ -143,7 +143,8 @@ def solving(process: subprocess.Popen[str], client: httpx2.Client, asking: Askin
         assert asking.is_alive(), asking.answer and asking.answer.text[:300]
     descendants = psutil.Process(process.pid).children(recursive=True)
     for each in descendants:
-        each.suspend()
+        with suppress(psutil.Error):
+            each.suspend()
     try:
         yield
     finally:
