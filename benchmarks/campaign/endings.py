@@ -4,8 +4,6 @@ import asyncio
 import json
 import time
 
-import psutil
-
 from .bodies import STEADY, slow
 from .service import Service, runs
 from .state import State

@@ -141,14 +141,16 @@ def solving(process: subprocess.Popen[str], client: httpx2.Client, asking: Askin
     """Hold the solvers once one of them is at work, so that it is at work for as long as the test needs."""
     while "waywright_solvers_busy 0.0\n" in client.get("/metrics").text:
         assert asking.is_alive(), asking.answer and asking.answer.text[:300]
-    descendants = psutil.Process(process.pid).children(recursive=True)
-    for each in descendants:
+    children = psutil.Process(process.pid).children()
+    solvers = [one for child in children if any("forkserver" in w for w in child.cmdline()) for one in child.children()]
+    assert solvers
+    for each in solvers:
         with suppress(psutil.Error):
             each.suspend()
     try:
         yield
     finally:
-        for each in descendants:
+        for each in solvers:
             with suppress(psutil.Error):
                 each.resume()
 
