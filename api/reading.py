@@ -60,7 +60,8 @@ def parse(model: type[Model], value: Any) -> Model:
         With pointers to what is missing, unknown, of the wrong type or out of range.
     """
     if isinstance(value, dict):
-        unknown = [k for k in value if k not in model.model_fields]
+        known = model.model_fields
+        unknown = [k for k in value if k not in known]
         if len(unknown) > InvalidRequest.shown:  # thousands of them must cost nothing
             shown = unknown[: InvalidRequest.shown]
             raise InvalidRequest(
